@@ -1,0 +1,1 @@
+#include "core/session/charuco_board.h"

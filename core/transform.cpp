@@ -1,0 +1,34 @@
+#include "core/transform.h"
+
+#include "core/units.h"
+
+namespace skullstation {
+
+Eigen::Matrix4d Rigid3::matrix() const {
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  m.topLeftCorner<3, 3>() = rotation.toRotationMatrix();
+  m.topRightCorner<3, 1>() = translation;
+  return m;
+}
+
+Rigid3 Rigid3::from_matrix(const Eigen::Matrix<double, 3, 4>& matrix) {
+  return {Eigen::Quaterniond(Eigen::Matrix3d(matrix.leftCols<3>())).normalized(), matrix.col(3)};
+}
+
+Eigen::Matrix4d Similarity3::matrix() const {
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  m.topLeftCorner<3, 3>() = scale * rotation.toRotationMatrix();
+  m.topRightCorner<3, 1>() = translation;
+  return m;
+}
+
+Rigid3 rotation_about_z(double angle_deg) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(radians(angle_deg), Eigen::Vector3d::UnitZ())),
+          Eigen::Vector3d::Zero()};
+}
+
+double rotation_distance_deg(const Rigid3& a, const Rigid3& b) {
+  return degrees(a.rotation.angularDistance(b.rotation));
+}
+
+}  // namespace skullstation

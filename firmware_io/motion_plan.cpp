@@ -1,0 +1,1 @@
+#include "firmware_io/motion_plan.h"

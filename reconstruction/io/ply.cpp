@@ -1,0 +1,1 @@
+#include "reconstruction/io/ply.h"
