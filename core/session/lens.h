@@ -19,15 +19,18 @@ std::string to_string(LensModel model);
 Result<LensModel> lens_model_from_string(const std::string& name);
 int parameter_count(LensModel model);
 
-/// Intrinsics in pixels; pixel (0.5, 0.5) is the centre of the top-left pixel.
+/// Intrinsics in pixels; pixel (0.5, 0.5) is the centre of the top-left pixel. OpenCV's own
+/// functions call that point (0, 0): where its cx, cy or image points come in, 0.5 is added.
 struct Lens {
   int width = 0;
   int height = 0;
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
   double k1 = 0.0, k2 = 0.0, p1 = 0.0, p2 = 0.0;
 
+  /// \pre `params` has parameter_count(model) entries (std::invalid_argument otherwise).
   static Lens from_params(int width, int height, LensModel model,
                           const std::vector<double>& params);
+  /// \pre a lens with distortion is not asked for PINHOLE's (std::invalid_argument otherwise).
   std::vector<double> params(LensModel model) const;
 
   /// Image point [px] of a point in camera coordinates (z > 0), distortion included.
