@@ -12,6 +12,10 @@ namespace skullstation {
 /// A printed ChArUco board: the station's ruler. Board frame: origin at the board's centre, x to
 /// the right and y up on the printed page, z out of the paper, in mm. On a turntable the board
 /// lies face up and centred near the axis.
+///
+/// The pattern is our own definition, whatever OpenCV's version does: the square at the page's top
+/// left is black, white squares hold the dictionary's markers 0, 1, 2 ... row by row, upright.
+/// This is what OpenCV prints since 4.6 (before, only for an odd number of rows).
 struct CharucoBoard {
   std::string dictionary = "DICT_5X5_1000";
   int squares_x = 14;
@@ -19,6 +23,7 @@ struct CharucoBoard {
   double square_mm = 25.0;
   double marker_mm = 19.0;
 
+  /// Errors (bad_input) say what a board can't be.
   Result<void> validate() const;
   double width_mm() const { return squares_x * square_mm; }
   double height_mm() const { return squares_y * square_mm; }
@@ -32,7 +37,8 @@ struct CharucoBoard {
 };
 
 /// The board as it is printed, top of the page up: `pixels_per_square` px a square, 1 channel,
-/// no margin.
+/// no margin. Sampled by area, so squares and markers keep their exact size.
+/// \pre board.validate()
 Image8 draw_board(const CharucoBoard& board, int pixels_per_square);
 
 struct BoardCorner {
@@ -40,7 +46,10 @@ struct BoardCorner {
   Eigen::Vector2d position_px;  ///< pixel (0.5, 0.5) is the centre of the top-left pixel
 };
 
-/// The inner corners seen in the image, refined to sub-pixel accuracy; empty if there are none.
+/// The inner corners seen in the image (1 channel, or 3: RGB), refined to sub-pixel accuracy, in
+/// the order of their ids; empty if there are none, or for an image or board that is no such thing.
+/// Hidden corners are left out. Needs two neighbouring markers of about 10 px a side or more; a
+/// mirrored board is none. Deterministic.
 std::vector<BoardCorner> detect_board(const Image8& image, const CharucoBoard& board);
 
 }  // namespace skullstation
