@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "capture/simulation/board_print.h"
+#include "capture/simulation/bone_texture.h"
+#include "capture/simulation/sample_table.h"
+#include "capture/simulation/scene.h"
+#include "capture/simulation/specimen_surface.h"
+#include "core/transform.h"
+
+namespace skullstation {
+
+/// What of the scene never changes.
+struct SceneParts {
+  SceneOptions options;
+  std::shared_ptr<const SpecimenSurface> surface;  ///< null: a bare table
+  BoneTexture bone;
+  std::optional<BoardPrint> print;
+  SampleTable samples;
+};
+
+/// Light from everywhere but the lamps, in the unit of radiance that a white surface would send
+/// back. Neutral from the room and the board, tinted from the bone itself.
+struct Ambient {
+  float neutral = 0.0F;
+  float from_bone = 0.0F;
+};
+
+/// How much of the sky the specimen leaves to the points of the table's top: a square grid in the
+/// table frame, bilinear between its points, 1 outside.
+struct TableSky {
+  static constexpr int size = 241;
+  static constexpr double spacing_mm = 2.5;
+  std::vector<float> open;  ///< size x size, row-major, y upwards; empty: no specimen
+
+  float at(double x_table, double y_table) const;
+};
+
+/// The scene at one moment: what the renderer sees. Never changed after it was made.
+struct PlacedScene {
+  std::shared_ptr<const SceneParts> parts;
+  Rigid3 table_from_board;
+  std::optional<Rigid3> table_from_specimen;
+  std::vector<Ambient> vertex_ambient;  ///< per vertex of the shading mesh; empty: no specimen
+  TableSky table_sky;
+};
+
+/// Radiance of the room in a direction (unit, z up) and the ambient light on a surface that sees
+/// all of it, to its normal's side.
+float sky_radiance(const SceneOptions& options, double direction_z);
+float open_ambient(const SceneOptions& options, double normal_z);
+
+/// Fills in vertex_ambient and table_sky by casting rays from every vertex. The ambient light does
+/// not depend on the table's angle, since the room's own light is the same from all sides.
+void compute_ambient(PlacedScene& scene, int threads);
+
+}  // namespace skullstation

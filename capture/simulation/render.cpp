@@ -1,0 +1,195 @@
+#include "capture/simulation/render.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "capture/simulation/view_tracer.h"
+#include "core/parallel.h"
+#include "core/units.h"
+
+namespace skullstation {
+
+namespace {
+
+using Eigen::Vector3f;
+
+constexpr int tile_px = 32;
+
+/// The samples of a pixel so far.
+struct PixelSum {
+  Vector3f radiance = Vector3f::Zero();
+  float darkest = std::numeric_limits<float>::infinity();
+  float brightest = 0.0F;
+  std::uint8_t objects = 0;  ///< one bit for each SceneObject
+  std::uint8_t count = 0;
+
+  void add(const TracedSample& sample) {
+    const float luminance = 0.2126F * sample.radiance.x() + 0.7152F * sample.radiance.y() +
+                            0.0722F * sample.radiance.z();
+    radiance += sample.radiance;
+    darkest = std::min(darkest, luminance);
+    brightest = std::max(brightest, luminance);
+    objects |= static_cast<std::uint8_t>(1U << static_cast<unsigned>(sample.object));
+    ++count;
+  }
+  /// The offset keeps the noise of dark places from counting.
+  bool uneven(float contrast) const {
+    constexpr float dark = 0.02F;
+    return (objects & (objects - 1)) != 0 ||
+           brightest - darkest > contrast * (brightest + darkest + dark);
+  }
+};
+
+struct Tiles {
+  int width, height;
+
+  int across() const { return (width + tile_px - 1) / tile_px; }
+  int count() const { return across() * ((height + tile_px - 1) / tile_px); }
+  template <class Work>
+  void for_pixels(int tile, const Work& work) const {
+    const int left = tile % across() * tile_px;
+    const int top = tile / across() * tile_px;
+    for (int y = top; y < std::min(height, top + tile_px); ++y) {
+      for (int x = left; x < std::min(width, left + tile_px); ++x) work(x, y);
+    }
+  }
+};
+
+/// Natural vignetting: cos^4 of the angle to the optical axis.
+float vignette(const PreparedOptics& optics, int x, int y) {
+  const double squared = optics.ray(x + 0.5, y + 0.5).squaredNorm();
+  return static_cast<float>(std::pow(1.0 + squared, -2.0 * optics.optics().vignetting));
+}
+
+}  // namespace
+
+Result<void> RenderOptions::validate() const {
+  const auto bad = [](const char* option, const std::string& what) {
+    return fail(ErrorKind::bad_input, fmt::format("simulated camera, {}", option), what);
+  };
+  if (samples < 1 || samples > SampleTable::points) {
+    return bad("samples", fmt::format("must be 1 to {}", SampleTable::points));
+  }
+  if (samples_where_uneven < samples || samples_where_uneven > SampleTable::points) {
+    return bad("samples_where_uneven",
+               fmt::format("must be at least samples and at most {}", SampleTable::points));
+  }
+  if (!(uneven_contrast >= 0.0)) return bad("uneven_contrast", "must not be negative");
+  return {};
+}
+
+ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics,
+                       std::span<const double> table_angles_deg, const RenderOptions& options) {
+  const std::shared_ptr<const PlacedScene> placed = scene.placed();
+  const Lens& lens = optics.optics().lens;
+  const Tiles tiles{lens.width, lens.height};
+  std::vector<PixelSum> sums(static_cast<std::size_t>(lens.width) * lens.height);
+  const auto sum_of = [&](int x, int y) -> PixelSum& {
+    return sums[static_cast<std::size_t>(y) * lens.width + x];
+  };
+  const auto trace_tile = [&](int tile, int first, int last, const auto& wanted) {
+    std::vector<PixelSample> samples;
+    tiles.for_pixels(tile, [&](int x, int y) {
+      if (!wanted(x, y)) return;
+      for (int i = first; i < last; ++i) samples.push_back({x, y, i});
+    });
+    if (samples.empty()) return;
+    ViewTracer tracer(*placed, optics, table_angles_deg, options);
+    std::vector<TracedSample> traced(samples.size());
+    tracer.trace(samples, traced);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      sum_of(samples[i].x, samples[i].y).add(traced[i]);
+    }
+  };
+
+  parallel_for(tiles.count(), options.threads, [&](int tile) {
+    trace_tile(tile, 0, options.samples, [](int, int) { return true; });
+  });
+
+  // More samples where the first ones disagree, and beside such pixels: there the first few may
+  // have missed an edge. Deciding by the neighbours, too, keeps edges where they are.
+  std::vector<char> uneven(sums.size());
+  std::transform(sums.begin(), sums.end(), uneven.begin(), [&](const PixelSum& sum) {
+    return sum.uneven(static_cast<float>(options.uneven_contrast)) ? 1 : 0;
+  });
+  const auto near_uneven = [&](int x, int y) {
+    for (int j = std::max(0, y - 1); j <= std::min(lens.height - 1, y + 1); ++j) {
+      for (int i = std::max(0, x - 1); i <= std::min(lens.width - 1, x + 1); ++i) {
+        const std::size_t at = static_cast<std::size_t>(j) * lens.width + i;
+        if (uneven[at] || sums[at].objects != sum_of(x, y).objects) return true;
+      }
+    }
+    return false;
+  };
+  if (options.samples_where_uneven > options.samples) {
+    std::vector<char> again(sums.size());
+    parallel_for(lens.height, options.threads, [&](int y) {
+      for (int x = 0; x < lens.width; ++x) {
+        again[static_cast<std::size_t>(y) * lens.width + x] = near_uneven(x, y) ? 1 : 0;
+      }
+    });
+    parallel_for(tiles.count(), options.threads, [&](int tile) {
+      trace_tile(tile, options.samples, options.samples_where_uneven, [&](int x, int y) {
+        return again[static_cast<std::size_t>(y) * lens.width + x] != 0;
+      });
+    });
+  }
+
+  ImageF image(lens.width, lens.height, 3);
+  parallel_for(lens.height, options.threads, [&](int y) {
+    for (int x = 0; x < lens.width; ++x) {
+      const PixelSum& sum = sum_of(x, y);
+      const float factor = vignette(optics, x, y) / static_cast<float>(sum.count);
+      for (int channel = 0; channel < 3; ++channel) {
+        image.at(x, y, channel) = factor * sum.radiance[channel];
+      }
+    }
+  });
+  return image;
+}
+
+ViewTruth render_truth(const SimulatedScene& scene, const PreparedOptics& optics,
+                       double table_angle_deg, int threads) {
+  const std::shared_ptr<const PlacedScene> placed = scene.placed();
+  const Lens& lens = optics.optics().lens;
+  const Rigid3 table_from_camera =
+      (optics.optics().camera_from_station * rotation_about_z(table_angle_deg)).inverse();
+  const bool specimen = placed->table_from_specimen.has_value();
+  const Rigid3 specimen_from_table = specimen ? placed->table_from_specimen->inverse() : Rigid3{};
+  ViewTruth truth{ImageF(lens.width, lens.height, 1), Image8(lens.width, lens.height, 1)};
+  parallel_for(lens.height, threads, [&](int y) {
+    std::vector<SpecimenRay> rays;
+    std::vector<SurfacePoint> points;
+    for (int x = 0; x < lens.width; ++x) {
+      const Eigen::Vector3d along = optics.ray(x + 0.5, y + 0.5).homogeneous();
+      SightRay ray;
+      ray.origin = table_from_camera.translation;
+      ray.direction = table_from_camera.rotation * along.normalized();
+      points.push_back(hit_table(*placed, ray));
+      rays.push_back({specimen_from_table * ray.origin,
+                      specimen_from_table.rotation * ray.direction,
+                      std::min(points.back().distance_mm, 1e6)});
+    }
+    std::vector<SpecimenHit> hits(rays.size());
+    if (specimen) placed->parts->surface->intersect(rays, hits);
+    for (int x = 0; x < lens.width; ++x) {
+      SceneObject object = points[x].object;
+      double distance = points[x].distance_mm;
+      if (hits[x].triangle >= 0) {
+        object = SceneObject::specimen;
+        distance = hits[x].distance_mm;
+      }
+      truth.object.at(x, y) = static_cast<std::uint8_t>(object);
+      if (object != SceneObject::backdrop) {
+        const double stretch = optics.ray(x + 0.5, y + 0.5).homogeneous().norm();
+        truth.depth_mm.at(x, y) = static_cast<float>(distance / stretch);
+      }
+    }
+  });
+  return truth;
+}
+
+}  // namespace skullstation

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "capture/simulation/render.h"
+#include "capture/simulation/surface_point.h"
+
+namespace skullstation {
+
+/// Light that arrives along one sample's ray.
+struct TracedSample {
+  Eigen::Vector3f radiance = Eigen::Vector3f::Zero();
+  SceneObject object = SceneObject::backdrop;
+};
+
+/// A sample to be traced: which one of which pixel.
+struct PixelSample {
+  int x = 0;
+  int y = 0;
+  int index = 0;
+};
+
+/// Traces samples of one view. One for each thread: it keeps buffers between calls.
+class ViewTracer {
+ public:
+  ViewTracer(const PlacedScene& scene, const PreparedOptics& optics,
+             std::span<const double> table_angles_deg, const RenderOptions& options);
+
+  /// The light of each sample; `traced` is as long as `samples`.
+  void trace(std::span<const PixelSample> samples, std::span<TracedSample> traced);
+
+ private:
+  struct Sight {
+    SightRay ray;  // table frame
+    double cos_table = 1.0;
+    double sin_table = 0.0;
+    std::uint64_t pixel_hash = 0;
+  };
+  Sight sight(const PixelSample& sample) const;
+  double table_angle_deg(double time) const;
+  void add_lamps(const SurfacePoint& point, const Sight& sight, const PixelSample& sample,
+                 std::size_t sample_number);
+
+  const PlacedScene& scene_;
+  const PreparedOptics& optics_;
+  std::vector<double> table_angles_deg_;
+  RenderOptions options_;
+  bool moving_ = false;
+  double still_cos_ = 1.0;
+  double still_sin_ = 0.0;
+  Rigid3 station_from_camera_;
+  Rigid3 specimen_from_table_;
+  Eigen::Matrix3d table_rotation_specimen_;
+
+  // What a shadow ray carries to its sample if nothing is in its way.
+  struct LampLight {
+    std::size_t sample_number;
+    Eigen::Vector3f radiance;
+  };
+  std::vector<Sight> sights_;
+  std::vector<SurfacePoint> points_;
+  std::vector<SpecimenRay> rays_;
+  std::vector<SpecimenHit> hits_;
+  std::vector<SpecimenRay> shadow_rays_;
+  std::vector<LampLight> lamp_lights_;
+  std::vector<std::uint8_t> blocked_;
+};
+
+}  // namespace skullstation
