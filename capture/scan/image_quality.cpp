@@ -1,0 +1,238 @@
+#include "capture/scan/image_quality.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "capture/scan/specimen_mask.h"
+
+namespace skullstation {
+
+namespace {
+
+cv::Mat view_of(const Image8& image) {
+  // OpenCV has no header over const pixels; the result is only read.
+  return {image.height, image.width, CV_8UC(image.channels),
+          const_cast<std::uint8_t*>(image.pixels.data())};
+}
+
+Image8 grey_of(const Image8& image) {
+  if (image.channels == 1) return image;
+  Image8 grey(image.width, image.height, 1);
+  cv::Mat target = view_of(grey);
+  cv::cvtColor(view_of(image), target, cv::COLOR_RGB2GRAY);
+  return grey;
+}
+
+cv::Mat reduced(const cv::Mat& image, int factor) {
+  cv::Mat smaller;
+  // Whole blocks only, so that every level covers the same pixels.
+  const cv::Rect whole(0, 0, image.cols / factor * factor, image.rows / factor * factor);
+  cv::resize(image(whole), smaller, {}, 1.0 / factor, 1.0 / factor, cv::INTER_AREA);
+  return smaller;
+}
+
+// ---- levels and the frame's border ----
+
+void measure_levels(const Image8& image, const Image8& grey, const Image8& specimen,
+                    ViewQuality& quality) {
+  constexpr int dark_level = 8;
+  std::int64_t pixels = 0;
+  std::int64_t clipped = 0;
+  std::int64_t dark = 0;
+  std::int64_t sum = 0;
+  for (int y = 0; y < image.height; ++y) {
+    const std::uint8_t* mask = specimen.row(y / ViewRegions::scale);
+    const std::uint8_t* colors = image.row(y);
+    const std::uint8_t* levels = grey.row(y);
+    for (int x = 0; x < image.width; ++x) {
+      if (mask[x / ViewRegions::scale] == 0) continue;
+      ++pixels;
+      sum += levels[x];
+      if (levels[x] < dark_level) ++dark;
+      const std::uint8_t* color = colors + static_cast<std::ptrdiff_t>(x) * image.channels;
+      if (std::find(color, color + image.channels, 255) != color + image.channels) ++clipped;
+    }
+  }
+  const double all = static_cast<double>(image.width) * image.height;
+  quality.specimen_percent = 100.0 * static_cast<double>(pixels) / all;
+  if (pixels == 0) return;
+  quality.clipped_percent = 100.0 * static_cast<double>(clipped) / static_cast<double>(pixels);
+  quality.dark_percent = 100.0 * static_cast<double>(dark) / static_cast<double>(pixels);
+  quality.mean_level = static_cast<double>(sum) / static_cast<double>(pixels);
+}
+
+double border_percent(const Image8& specimen) {
+  int border = 0;
+  int touched = 0;
+  for (int y = 0; y < specimen.height; ++y) {
+    for (int x = 0; x < specimen.width; ++x) {
+      if (x != 0 && y != 0 && x != specimen.width - 1 && y != specimen.height - 1) continue;
+      ++border;
+      if (specimen.at(x, y) != 0) ++touched;
+    }
+  }
+  return border == 0 ? 0.0 : 100.0 * touched / border;
+}
+
+// ---- sharpness ----
+
+/// Four-neighbour Laplacian of the pixel at `p`.
+int laplacian(const std::uint8_t* p, std::ptrdiff_t stride) {
+  return p[-1] + p[1] + p[-stride] + p[stride] - 4 * p[0];
+}
+
+/// Mean product of the two frames' Laplacians over the mask: their energy, without the noise,
+/// which is independent between frames. With one frame, the product with itself less the noise.
+double detail_energy(const cv::Mat& image, const cv::Mat* earlier, const cv::Mat& mask) {
+  const int mask_scale =
+      std::max(1, static_cast<int>(std::lround(static_cast<double>(image.cols) / mask.cols)));
+  const auto stride = static_cast<std::ptrdiff_t>(image.step);
+  std::int64_t product = 0;
+  std::int64_t magnitude = 0;
+  std::int64_t pixels = 0;
+  for (int y = 1; y + 1 < image.rows; ++y) {
+    const int mask_y = std::min(y / mask_scale, mask.rows - 1);
+    const std::uint8_t* mask_row = mask.ptr(mask_y);
+    const std::uint8_t* row = image.ptr(y);
+    const std::uint8_t* earlier_row = earlier != nullptr ? earlier->ptr(y) : row;
+    for (int x = 1; x + 1 < image.cols; ++x) {
+      if (mask_row[std::min(x / mask_scale, mask.cols - 1)] == 0) continue;
+      const int here = laplacian(row + x, stride);
+      product += static_cast<std::int64_t>(here) * laplacian(earlier_row + x, stride);
+      // Immerkær's kernel (1 -2 1; -2 4 -2; 1 -2 1) does not see edges and ramps.
+      if (earlier == nullptr) {
+        const std::uint8_t* p = row + x;
+        magnitude += std::abs(p[-stride - 1] + p[-stride + 1] + p[stride - 1] + p[stride + 1] -
+                              2 * (p[-1] + p[1] + p[-stride] + p[stride]) + 4 * p[0]);
+      }
+      ++pixels;
+    }
+  }
+  if (pixels == 0) return 0.0;
+  const double energy = static_cast<double>(product) / static_cast<double>(pixels);
+  const double noise_sd = std::sqrt(std::numbers::pi / 2.0) / 6.0 * static_cast<double>(magnitude) /
+                          static_cast<double>(pixels);
+  // The Laplacian's weights squared and added: 1 + 1 + 1 + 1 + 16.
+  return std::max(0.0, energy - 20.0 * noise_sd * noise_sd);
+}
+
+double sharpness(const cv::Mat& grey, const cv::Mat* earlier, const cv::Mat& specimen) {
+  cv::Mat inside;  // silhouettes are strong edges in any view
+  cv::erode(specimen, inside, cv::Mat(), {-1, -1}, 3, cv::BORDER_CONSTANT, cv::Scalar(0));
+  const cv::Mat half = reduced(grey, 2);
+  cv::Mat earlier_half;
+  if (earlier != nullptr) earlier_half = reduced(*earlier, 2);
+  const double fine = detail_energy(grey, earlier, inside);
+  const double coarse = detail_energy(half, earlier != nullptr ? &earlier_half : nullptr, inside);
+  return coarse > 0.0 ? fine / coarse : 0.0;
+}
+
+// ---- motion ----
+
+/// Shift of one block between two frames, by least squares on brightness constancy (Lucas &
+/// Kanade 1981) with a change of gain and offset, so that flicker is no motion.
+struct BlockShift {
+  double length_px = 0.0;
+  double standard_error_px = 0.0;
+};
+
+std::optional<BlockShift> block_shift(const cv::Mat& before, const cv::Mat& after, cv::Rect block) {
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+  double square_sum = 0.0;
+  int pixels = 0;
+  for (int y = std::max(1, block.y); y < std::min(before.rows - 1, block.y + block.height); ++y) {
+    for (int x = std::max(1, block.x); x < std::min(before.cols - 1, block.x + block.width); ++x) {
+      // Gradients of the mean of both frames: half the noise, and symmetric in time.
+      const auto sum = [&](int at_y, int at_x) {
+        return before.at<std::uint8_t>(at_y, at_x) + after.at<std::uint8_t>(at_y, at_x);
+      };
+      const double gx = (sum(y, x + 1) - sum(y, x - 1)) / 4.0;
+      const double gy = (sum(y + 1, x) - sum(y - 1, x)) / 4.0;
+      const double change = after.at<std::uint8_t>(y, x) - before.at<std::uint8_t>(y, x);
+      const Eigen::Vector4d row(-gx, -gy, sum(y, x) / 512.0, 1.0);
+      normal += row * row.transpose();
+      right += row * change;
+      square_sum += change * change;
+      ++pixels;
+    }
+  }
+  if (pixels < 64) return std::nullopt;
+  const Eigen::LDLT<Eigen::Matrix4d> solver(normal + 1e-6 * Eigen::Matrix4d::Identity());
+  const Eigen::Vector4d solution = solver.solve(right);
+  const double residual = std::max(0.0, square_sum - solution.dot(right)) / (pixels - 4);
+  const Eigen::Matrix4d covariance = residual * solver.solve(Eigen::Matrix4d::Identity());
+  return BlockShift{solution.head<2>().norm(),
+                    std::sqrt(std::max(0.0, covariance.topLeftCorner<2, 2>().trace()))};
+}
+
+/// Upper quartile of the blocks' shifts, in pixels of the full image; 0 if no block is certain.
+double upper_quartile_shift(const cv::Mat& before, const cv::Mat& after, const cv::Mat& turning,
+                            int scale, int block_side) {
+  constexpr double certain_px = 0.1;  // of the full image
+  std::vector<double> shifts;
+  for (int y = 0; y + block_side <= before.rows; y += block_side) {
+    for (int x = 0; x + block_side <= before.cols; x += block_side) {
+      const int mask_x = (x + block_side / 2) * scale / ViewRegions::scale;
+      const int mask_y = (y + block_side / 2) * scale / ViewRegions::scale;
+      if (mask_x >= turning.cols || mask_y >= turning.rows ||
+          turning.at<std::uint8_t>(mask_y, mask_x) == 0) {
+        continue;
+      }
+      const auto shift = block_shift(before, after, {x, y, block_side, block_side});
+      if (shift && shift->standard_error_px * scale < certain_px) {
+        shifts.push_back(shift->length_px * scale);
+      }
+    }
+  }
+  if (shifts.empty()) return 0.0;
+  const auto quartile = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() * 3 / 4);
+  std::ranges::nth_element(shifts, quartile);
+  return *quartile;
+}
+
+double motion_px(const cv::Mat& before, const cv::Mat& after, const cv::Mat& turning) {
+  // The fine level measures what the gate decides on; the coarse one sees shifts that are too
+  // large for the fine one's linearisation.
+  double motion = 0.0;
+  for (const auto& [scale, block_side] : {std::pair{2, 32}, std::pair{8, 16}}) {
+    motion = std::max(motion, upper_quartile_shift(reduced(before, scale), reduced(after, scale),
+                                                   turning, scale, block_side));
+  }
+  return motion;
+}
+
+}  // namespace
+
+ViewQuality measure_view(const Image8& image, const Image8* earlier,
+                         const std::optional<CharucoBoard>& board) {
+  ViewQuality quality;
+  const Image8 grey = grey_of(image);
+  std::vector<BoardCorner> corners;
+  if (board) corners = detect_board(grey, *board);
+  quality.board_corners = static_cast<int>(corners.size());
+
+  const ViewRegions regions = find_specimen(grey, corners, board);
+  measure_levels(image, grey, regions.specimen, quality);
+  quality.border_percent = border_percent(regions.specimen);
+
+  const cv::Mat specimen = view_of(regions.specimen);
+  if (earlier == nullptr) {
+    quality.sharpness = sharpness(view_of(grey), nullptr, specimen);
+    return quality;
+  }
+  const Image8 earlier_grey = grey_of(*earlier);
+  const cv::Mat before = view_of(earlier_grey);
+  quality.sharpness = sharpness(view_of(grey), &before, specimen);
+  const cv::Mat turning = specimen | view_of(regions.board);
+  quality.motion_px = motion_px(before, view_of(grey), turning);
+  return quality;
+}
+
+}  // namespace skullstation
