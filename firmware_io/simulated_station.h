@@ -15,10 +15,12 @@ namespace skullstation {
 /// What can go wrong with a simulated station, switched on one by one.
 struct SimulatedFaults {
   double slip_fraction = 0.0;                  ///< of every commanded turn, lost (0.02 = 2 %)
-  std::optional<double> stall_at_deg;          ///< total turn [deg] after which the platter sticks
+  std::optional<double> stall_at_deg;          ///< total turn [deg], homing's included, after which
+                                               ///< the platter sticks
   bool index_switch_missing = false;           ///< homing never sees its switch
   bool button_bounces = false;                 ///< each edge of the button comes as a burst
-  std::optional<double> estop_after_turn_deg;  ///< total turn [deg] at which someone hits the stop
+  std::optional<double> estop_after_turn_deg;  ///< total turn [deg], homing's included, at which
+                                               ///< someone hits the stop
   bool estop_stuck = false;                    ///< reset() finds the button still pressed
 };
 
@@ -27,6 +29,7 @@ struct SimulatedFaults {
 /// with a SystemClock it moves as a real one does.
 class SimulatedStation {
  public:
+  /// \pre config.validate() holds.
   SimulatedStation(const TurntableConfig& config, const SimulatedFaults& faults, Clock& clock,
                    std::uint64_t seed);
   ~SimulatedStation();
@@ -38,10 +41,11 @@ class SimulatedStation {
   StationHardware hardware();
 
   /// The truth: where the platter really is at any moment so far (slip, backlash and the
-  /// vibration after each stop included), unwrapped [deg]. Safe from any thread.
+  /// vibration after each stop included), unwrapped [deg], from where a perfect homing ends. The
+  /// last quarter of a million steps are remembered. Safe from any thread.
   double true_table_angle_deg(Instant at) const;
 
-  /// What a hand does at the station.
+  /// What a hand does at the station. From 1.5 s on a press is Press::held.
   void press_button(std::chrono::milliseconds held);
   void press_estop();
   void release_estop();

@@ -1,11 +1,22 @@
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <stop_token>
+#include <string>
 
 #include "core/result.h"
 
 namespace skullstation {
+
+/// How punctually steps were made since the station was opened: what `doctor` shows.
+struct SteppingDiagnostics {
+  long steps = 0;
+  long late_steps = 0;  ///< more than 1 ms late; each shifted the rest of its motion
+  std::chrono::nanoseconds max_lateness{0};
+  std::string
+      not_real_time;  ///< why the stepping thread has no real-time priority; empty if it has
+};
 
 /// A turntable with one axis. Angles are degrees counter-clockwise seen from above, in [0, 360);
 /// 0 is where homing ends. Calls block until the platter stands still (vibration apart: settling
@@ -26,8 +37,11 @@ class Turntable {
   /// it (see TurntableConfig::holds_without_current).
   virtual Result<void> release() = 0;
 
-  /// Where the platter was last commanded to, if that is known.
+  /// Where the platter was last commanded to, in whole steps (so it may differ from what was
+  /// asked by half a step), if that is known. Safe from any thread.
   virtual std::optional<double> angle_deg() const = 0;
+
+  virtual SteppingDiagnostics diagnostics() const { return {}; }
 };
 
 }  // namespace skullstation

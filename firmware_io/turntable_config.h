@@ -13,7 +13,7 @@ struct TurntableConfig {
   double home_speed_deg_s = 10.0;      ///< while looking for the index switch
   double home_search_deg = 400.0;      ///< give up ("index switch never seen") after this much
   double home_offset_deg = 0.0;        ///< from the switch's edge to the zero
-  bool release_when_idle = true;       ///< motor current off after a scan
+  bool release_when_idle = true;       ///< whoever scans calls release() at the end
   bool holds_without_current = false;  ///< a worm gear, say: release() keeps the position
 
   Result<void> validate() const;
