@@ -246,30 +246,43 @@ class CornerGrid {
   std::vector<std::optional<Eigen::Vector2d>> positions_;
 };
 
-std::optional<Eigen::Vector2d> fit_at(const Image8& grey, const CharucoBoard& board, int column,
-                                      int row, const Eigen::Vector2d& mm, const Homography& map) {
+/// What every corner's fit needs to know.
+struct Search {
+  const Image8& grey;
+  const CharucoBoard& board;
+  double ring_mm = 0.0;  ///< the black ring around each marker's bits
+};
+
+std::optional<Eigen::Vector2d> fit_at(const Search& search, int column, int row,
+                                      const Eigen::Vector2d& mm, const Homography& map) {
+  const CharucoBoard& board = search.board;
+  const Image8& grey = search.grey;
   ExpectedCorner expected;
   expected.position_px = map(mm);
   expected.px_from_mm = map.jacobian(mm);
   // The square to the upper right of the corner is (column + 1, row) from the page's top left.
   expected.first_quadrant_white = (column + row) % 2 == 0;
   expected.free_mm = 0.5 * (board.square_mm - board.marker_mm);
+  expected.ring_mm = search.ring_mm;
   expected.square_mm = board.square_mm;
   const double area = std::abs(expected.px_from_mm.determinant());
   const double narrow =
       area / std::max(expected.px_from_mm.col(0).norm(), expected.px_from_mm.col(1).norm());
   expected.max_shift_px = std::max(1.0, 0.25 * board.square_mm * narrow);
   if (!(area > 0.0) || !expected.position_px.allFinite()) return std::nullopt;
-  if (expected.position_px.x() < 0.0 || expected.position_px.y() < 0.0 ||
-      expected.position_px.x() > grey.width || expected.position_px.y() > grey.height) {
+  // At the very rim half of the corner's picture is missing.
+  constexpr double rim_px = 3.0;
+  const Eigen::Vector2d far_rim(grey.width - rim_px, grey.height - rim_px);
+  if ((expected.position_px.array() < rim_px).any() ||
+      (expected.position_px.array() > far_rim.array()).any()) {
     return std::nullopt;
   }
   return fit_corner(grey, expected);
 }
 
-void seed_from_markers(const Image8& grey, const CharucoBoard& board,
-                       const std::vector<SeenMarker>& markers, CornerGrid& grid) {
-  std::vector<Correspondences> touching(static_cast<std::size_t>(board.corner_count()));
+void seed_from_markers(const Search& search, const std::vector<SeenMarker>& markers,
+                       CornerGrid& grid) {
+  std::vector<Correspondences> touching(static_cast<std::size_t>(search.board.corner_count()));
   for (const SeenMarker& seen : markers) {
     for (int dy = -1; dy <= 0; ++dy) {
       for (int dx = -1; dx <= 0; ++dx) {
@@ -286,14 +299,14 @@ void seed_from_markers(const Image8& grey, const CharucoBoard& board,
       const auto map =
           fit_homography(touching[static_cast<std::size_t>(row * grid.columns() + column)]);
       if (!map) continue;
-      grid.at(column, row) = fit_at(grey, board, column, row, grid.board_mm(column, row), *map);
+      grid.at(column, row) = fit_at(search, column, row, grid.board_mm(column, row), *map);
     }
   }
 }
 
 /// Corners whose neighbours are known, again and again until none is added.
-void grow(const Image8& grey, const CharucoBoard& board, CornerGrid& grid) {
-  std::vector<std::size_t> tried(static_cast<std::size_t>(board.corner_count()));
+void grow(const Search& search, CornerGrid& grid) {
+  std::vector<std::size_t> tried(static_cast<std::size_t>(search.board.corner_count()));
   for (bool added = true; added;) {
     added = false;
     for (int row = 0; row < grid.rows(); ++row) {
@@ -308,7 +321,7 @@ void grow(const Image8& grey, const CharucoBoard& board, CornerGrid& grid) {
         tried_with = known.board_mm.size();
         const auto map = fit_homography(known);
         if (!map) continue;
-        auto fitted = fit_at(grey, board, column, row, grid.board_mm(column, row), *map);
+        auto fitted = fit_at(search, column, row, grid.board_mm(column, row), *map);
         if (!fitted) continue;
         grid.at(column, row) = fitted;
         added = true;
@@ -371,11 +384,15 @@ std::vector<BoardCorner> detect_board(const Image8& image, const CharucoBoard& b
   // The smallest threshold window of the marker detection.
   if (image.width < 16 || image.height < 16 || !board.validate()) return {};
   const Image8 grey = grey_of(image);
-  const std::vector<SeenMarker> markers = consistent_markers(find_markers(grey, board));
-  if (markers.empty()) return {};
+  const std::vector<SeenMarker> seen = find_markers(grey, board);
+  const std::vector<SeenMarker> markers = consistent_markers(seen);
+  // Where most markers contradict the group, it is another board, of whose rows one may fit.
+  if (markers.empty() || 2 * markers.size() <= seen.size()) return {};
+  const int marker_bits_across = marker_dictionary(board.dictionary)->bits + 2;
+  const Search search{grey, board, board.marker_mm / marker_bits_across};
   CornerGrid grid(board);
-  seed_from_markers(grey, board, markers, grid);
-  grow(grey, board, grid);
+  seed_from_markers(search, markers, grid);
+  grow(search, grid);
   drop_inconsistent(board, grid);
   std::vector<BoardCorner> corners;
   for (int row = 0; row < grid.rows(); ++row) {
