@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "capture/cameras/camera_settings.h"
+#include "capture/cameras/discarded_frames.h"
 #include "capture/cameras/exposure_time.h"
 #include "capture/cameras/v4l2_controls.h"
 #include "capture/cameras/v4l2_stream.h"
@@ -32,27 +33,6 @@ std::string stream_text(const V4l2StreamFormat& format) {
   return text;
 }
 
-/// Why pictures were discarded while waiting for a good one.
-struct Discarded {
-  int old = 0;
-  int settling = 0;
-  int damaged = 0;
-  std::string last_damage;
-
-  std::string text() const {
-    std::string reasons;
-    const auto add = [&reasons](int count, std::string_view what) {
-      if (count == 0) return;
-      reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", count, what);
-    };
-    add(old, "too old");
-    add(settling, "taken while its settings took effect");
-    add(damaged, "damaged");
-    if (reasons.empty()) return "none came";
-    return last_damage.empty() ? reasons : fmt::format("{}; the last: {}", reasons, last_damage);
-  }
-};
-
 /// Everything that exists while the device is open. Destroyed from the bottom up.
 struct OpenCamera {
   std::unique_ptr<V4l2Device> device;
@@ -77,7 +57,7 @@ class V4l2Camera final : public Camera {
 
  private:
   Result<std::optional<Frame>> frame_from(const V4l2Buffer& buffer, Instant not_before,
-                                          Discarded& discarded);
+                                          DiscardedFrames& discarded);
   Result<std::optional<Instant>> exposure_start(const V4l2Buffer& buffer);
   void settle();
   tl::unexpected<Error> closed() const;
@@ -140,7 +120,7 @@ Result<Frame> V4l2Camera::frame_after(Instant not_before, milliseconds timeout,
                                       std::stop_token stop) {
   if (!open_) return closed();
   const Instant deadline = system_->now() + timeout;
-  Discarded discarded;
+  DiscardedFrames discarded;
   do {
     const auto buffer = open_->stream.next(deadline, stop);
     if (!buffer) return forward(buffer);
@@ -157,7 +137,7 @@ Result<Frame> V4l2Camera::frame_after(Instant not_before, milliseconds timeout,
 
 /// Nothing if the picture is not one to use; `discarded` then says why.
 Result<std::optional<Frame>> V4l2Camera::frame_from(const V4l2Buffer& buffer, Instant not_before,
-                                                    Discarded& discarded) {
+                                                    DiscardedFrames& discarded) {
   const Result<std::optional<Instant>> start = exposure_start(buffer);
   if (!start) return forward(start);
   if (buffer.damaged) {
