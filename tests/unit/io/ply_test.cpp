@@ -8,21 +8,14 @@
 
 #include "core/file.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/unit/io/tetrahedron.h"
 
 namespace skullstation {
 namespace {
 
 using skullstation::testing::TemporaryFolder;
+using skullstation::testing::tetrahedron;
 using ::testing::HasSubstr;
-
-TriangleMesh tetrahedron() {
-  TriangleMesh mesh;
-  mesh.vertices.resize(4, 3);
-  mesh.vertices << 0, 0, 0, 10, 0, 0, 0, 10, 0, 0, 0, 10;
-  mesh.triangles.resize(4, 3);
-  mesh.triangles << 0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2;
-  return mesh;
-}
 
 std::string ascii_header(int vertices, int faces) {
   return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(vertices) +
