@@ -141,7 +141,7 @@ std::chrono::nanoseconds from_seconds(double seconds) {
 
 Result<void> expect_positive(const char* name, double value) {
   if (value > 0.0 && std::isfinite(value)) return {};
-  return fail(ErrorKind::bad_input, fmt::format("turntable.{}", name),
+  return fail(ErrorKind::bad_input, name,
               fmt::format("is {}; a number above 0 was expected", value));
 }
 
@@ -154,7 +154,7 @@ Result<void> MotionLimits::validate() const {
   if (auto ok = expect_positive("max_jerk_deg_s3", max_jerk_deg_s3); !ok) return ok;
   const double rate_hz = max_speed_deg_s / step_deg();
   if (rate_hz > max_step_rate_hz) {
-    return fail(ErrorKind::bad_input, "turntable.max_speed_deg_s",
+    return fail(ErrorKind::bad_input, "max_speed_deg_s",
                 fmt::format("{} deg/s at {} steps per turn is {:.0f} steps/s; at most {:.0f} are "
                             "possible",
                             max_speed_deg_s, steps_per_turn, rate_hz, max_step_rate_hz),

@@ -10,11 +10,11 @@ using std::chrono::milliseconds;
 
 Result<void> ButtonTiming::validate() const {
   if (debounce < milliseconds{0} || debounce > milliseconds{200}) {
-    return fail(ErrorKind::bad_input, "panel.debounce_ms",
+    return fail(ErrorKind::bad_input, "debounce_ms",
                 fmt::format("is {}; 0 to 200 was expected", debounce.count()));
   }
   if (held_after < 2 * debounce + milliseconds{100} || held_after > milliseconds{10'000}) {
-    return fail(ErrorKind::bad_input, "panel.held_after_ms",
+    return fail(ErrorKind::bad_input, "held_after_ms",
                 fmt::format("is {}; {} (twice the debounce time and 100) to 10000 was expected",
                             held_after.count(), (2 * debounce + milliseconds{100}).count()));
   }

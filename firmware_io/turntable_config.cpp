@@ -10,7 +10,7 @@ namespace {
 
 Result<void> expect_within(const char* name, double value, double low, double high) {
   if (value >= low && value <= high) return {};
-  return fail(ErrorKind::bad_input, fmt::format("turntable.{}", name),
+  return fail(ErrorKind::bad_input, name,
               fmt::format("is {}; {} to {} was expected", value, low, high));
 }
 

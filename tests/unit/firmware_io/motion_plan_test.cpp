@@ -188,13 +188,13 @@ TEST(MotionLimits, SayWhichOneIsWrong) {
   using testing::HasSubstr;
   EXPECT_EQ(message([](MotionLimits&) {}), "valid");
   EXPECT_THAT(message([](MotionLimits& l) { l.steps_per_turn = 0; }),
-              HasSubstr("turntable.steps_per_turn: is 0; a number above 0 was expected"));
+              HasSubstr("steps_per_turn: is 0; a number above 0 was expected"));
   EXPECT_THAT(message([](MotionLimits& l) { l.max_speed_deg_s = -3; }),
-              HasSubstr("turntable.max_speed_deg_s: is -3"));
+              HasSubstr("max_speed_deg_s: is -3"));
   EXPECT_THAT(message([](MotionLimits& l) { l.max_acceleration_deg_s2 = std::nan(""); }),
-              HasSubstr("turntable.max_acceleration_deg_s2: is nan"));
+              HasSubstr("max_acceleration_deg_s2: is nan"));
   EXPECT_THAT(message([](MotionLimits& l) { l.max_jerk_deg_s3 = INFINITY; }),
-              HasSubstr("turntable.max_jerk_deg_s3: is inf"));
+              HasSubstr("max_jerk_deg_s3: is inf"));
   EXPECT_THAT(message([](MotionLimits& l) { l.max_speed_deg_s = 36'000; }),
               HasSubstr("640000 steps/s"));
 }
