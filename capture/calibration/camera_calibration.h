@@ -66,9 +66,13 @@ Result<CameraCalibrationReport> calibrate_camera(const std::vector<CalibrationVi
                                                  const CharucoBoard& board, int width, int height,
                                                  const CameraCalibrationOptions& options = {});
 
+/// Distance at which the frontal board fills four fifths of the image.
+double filling_distance_mm(const CharucoBoard& board, const Lens& lens);
+
 /// camera_from_board of 20 views that make a good calibration: the board aslant in all directions,
-/// at three distances, all over the image. For instructions to the operator and for the simulated
-/// station. `lens` may be a guess.
-std::vector<Rigid3> calibration_poses(const CharucoBoard& board, const Lens& lens);
+/// all over the image, within 10 % of `distance_mm`, where the camera is focused. The board may
+/// reach beyond the frame. For instructions to the operator and for the simulated station; `lens`
+/// may be a guess.
+std::vector<Rigid3> calibration_poses(const Lens& lens, double distance_mm);
 
 }  // namespace skullstation
