@@ -29,7 +29,12 @@ struct JpegErrors {
 }
 
 void leave_on_warning(j_common_ptr decoder, int level) {
-  if (level < 0 && decoder->err->msg_code != JWRN_EXTRANEOUS_DATA) leave(decoder);
+  if (level >= 0) return;  // a trace message
+  // A stray byte or two before a marker is some cameras' habit; many are a picture that lost data.
+  constexpr int harmless_bytes = 16;
+  const bool harmless = decoder->err->msg_code == JWRN_EXTRANEOUS_DATA &&
+                        decoder->err->msg_parm.i[0] <= harmless_bytes;
+  if (!harmless) leave(decoder);
 }
 
 class JpegDecoder {
