@@ -45,6 +45,61 @@ bool refine(const std::vector<BoardCorner>& corners, const CharucoBoard& board, 
   return solve_bundle(problem);
 }
 
+/// Both poses that a plane allows, unrefined.
+std::vector<Rigid3> planar_poses(const std::vector<BoardCorner>& corners, const CharucoBoard& board,
+                                 const Lens& lens) {
+  std::vector<cv::Point3d> board_points;
+  std::vector<cv::Point2d> rays;  // undistorted, focal length 1
+  for (const BoardCorner& corner : corners) {
+    const auto ray = lens.ray(corner.position_px);
+    if (!ray) continue;
+    const Eigen::Vector3d x = board.corner(corner.id);
+    board_points.emplace_back(x.x(), x.y(), 0.0);
+    rays.emplace_back(ray->x(), ray->y());
+  }
+  if (rays.size() < 6) return {};
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  const double count = static_cast<double>(board_points.size());
+  for (const auto& p : board_points) mean += Eigen::Vector2d(p.x, p.y) / count;
+  for (const auto& p : board_points) {
+    const Eigen::Vector2d d = Eigen::Vector2d(p.x, p.y) - mean;
+    spread += d * d.transpose() / count;
+  }
+  const double square2 = board.square_mm * board.square_mm;
+  if (spread.determinant() < 0.01 * square2 * square2) return {};  // a single row
+
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
+  try {
+    cv::solvePnPGeneric(board_points, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations,
+                        translations, false, cv::SOLVEPNP_IPPE);
+  } catch (const cv::Exception&) {
+    return {};  // degenerate points
+  }
+  std::vector<Rigid3> poses;
+  for (std::size_t i = 0; i < rotations.size(); ++i) {
+    const Eigen::Map<const Eigen::Vector3d> r(rotations[i].ptr<double>());
+    const Eigen::Map<const Eigen::Vector3d> t(translations[i].ptr<double>());
+    if (!r.allFinite() || !t.allFinite() || !(t.z() > 0.0)) continue;
+    Rigid3 pose{Eigen::Quaterniond::Identity(), t};
+    if (r.norm() > 0.0) pose.rotation = Eigen::AngleAxisd(r.norm(), r.normalized());
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::optional<BoardPose> better_pose(const std::vector<BoardCorner>& corners,
+                                     const CharucoBoard& board, const Lens& lens, bool refined) {
+  std::optional<BoardPose> best;
+  for (Rigid3 pose : planar_poses(corners, board, lens)) {
+    if (refined && !refine(corners, board, lens, pose)) continue;
+    const double rms_px = reprojection_rms_px(corners, board, lens, pose);
+    if (std::isfinite(rms_px) && (!best || rms_px < best->rms_px)) best = BoardPose{pose, rms_px};
+  }
+  return best;
+}
+
 }  // namespace
 
 double reprojection_rms_px(const std::vector<BoardCorner>& corners, const CharucoBoard& board,
@@ -57,49 +112,14 @@ double reprojection_rms_px(const std::vector<BoardCorner>& corners, const Charuc
   return corners.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(corners.size()));
 }
 
+std::optional<BoardPose> rough_board_pose(const std::vector<BoardCorner>& corners,
+                                          const CharucoBoard& board, const Lens& lens) {
+  return better_pose(corners, board, lens, false);
+}
+
 std::optional<BoardPose> estimate_board_pose(const std::vector<BoardCorner>& corners,
                                              const CharucoBoard& board, const Lens& lens) {
-  std::vector<cv::Point3d> board_points;
-  std::vector<cv::Point2d> rays;  // undistorted, focal length 1
-  for (const BoardCorner& corner : corners) {
-    const auto ray = lens.ray(corner.position_px);
-    if (!ray) continue;
-    const Eigen::Vector3d x = board.corner(corner.id);
-    board_points.emplace_back(x.x(), x.y(), 0.0);
-    rays.emplace_back(ray->x(), ray->y());
-  }
-  if (rays.size() < 6) return std::nullopt;
-  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  const double count = static_cast<double>(board_points.size());
-  for (const auto& p : board_points) mean += Eigen::Vector2d(p.x, p.y) / count;
-  for (const auto& p : board_points) {
-    const Eigen::Vector2d d = Eigen::Vector2d(p.x, p.y) - mean;
-    spread += d * d.transpose() / count;
-  }
-  const double square2 = board.square_mm * board.square_mm;
-  if (spread.determinant() < 0.01 * square2 * square2) return std::nullopt;  // a single row
-
-  std::vector<cv::Mat> rotations;
-  std::vector<cv::Mat> translations;
-  try {
-    cv::solvePnPGeneric(board_points, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations,
-                        translations, false, cv::SOLVEPNP_IPPE);
-  } catch (const cv::Exception&) {
-    return std::nullopt;  // degenerate points
-  }
-  std::optional<BoardPose> best;
-  for (std::size_t i = 0; i < rotations.size(); ++i) {
-    const Eigen::Map<const Eigen::Vector3d> r(rotations[i].ptr<double>());
-    const Eigen::Map<const Eigen::Vector3d> t(translations[i].ptr<double>());
-    if (!r.allFinite() || !t.allFinite() || !(t.z() > 0.0)) continue;
-    Rigid3 pose{Eigen::Quaterniond::Identity(), t};
-    if (r.norm() > 0.0) pose.rotation = Eigen::AngleAxisd(r.norm(), r.normalized());
-    if (!refine(corners, board, lens, pose)) continue;
-    const double rms_px = reprojection_rms_px(corners, board, lens, pose);
-    if (std::isfinite(rms_px) && (!best || rms_px < best->rms_px)) best = BoardPose{pose, rms_px};
-  }
-  return best;
+  return better_pose(corners, board, lens, true);
 }
 
 }  // namespace skullstation

@@ -14,10 +14,13 @@ struct BoardPose {
   double rms_px = 0.0;  ///< root mean square distance of the corners from their projection
 };
 
-/// Where the board is, from its corners in one image: both solutions that a plane allows
-/// (Collins & Bartoli 2014, IPPE), each refined to the least reprojection error (Huber loss of
-/// 1 px), the better one. Nothing for fewer than 6 corners, corners on a line, or corners that
-/// no pose explains.
+/// Where the board is, from its corners in one image: the better of the two solutions that a plane
+/// allows (Collins & Bartoli 2014, IPPE). In closed form, fast and good to a start. Nothing for
+/// fewer than 6 corners, corners on a line, or corners that no pose explains.
+std::optional<BoardPose> rough_board_pose(const std::vector<BoardCorner>& corners,
+                                          const CharucoBoard& board, const Lens& lens);
+
+/// The same, each solution refined to the least reprojection error (Huber loss of 1 px) first.
 std::optional<BoardPose> estimate_board_pose(const std::vector<BoardCorner>& corners,
                                              const CharucoBoard& board, const Lens& lens);
 

@@ -85,7 +85,7 @@ double search_focal_length(std::vector<ActiveView>& views, const CharucoBoard& b
     double cost = 0.0;
     poses.clear();
     for (const ActiveView& view : views) {
-      const auto pose = estimate_board_pose(view.corners, board, lens);
+      const auto pose = rough_board_pose(view.corners, board, lens);
       // A view that contradicts the others must not outweigh them.
       const double limit = 0.02 * side;
       cost += pose ? std::min(pose->rms_px, limit) : limit;
@@ -95,7 +95,7 @@ double search_focal_length(std::vector<ActiveView>& views, const CharucoBoard& b
     return cost;
   };
   std::vector<Rigid3> poses;
-  constexpr int steps = 14;
+  constexpr int steps = 24;
   for (int step = 0; step < steps; ++step) {
     const double focal = 0.4 * side * std::pow(30.0, step / (steps - 1.0));
     const double cost = cost_of(focal, poses);
@@ -113,6 +113,22 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// The first, crude lens may have chosen the wrong one of the two poses that a plane allows: looks
+/// again at the views that fit worse than most.
+void choose_better_poses(std::vector<ActiveView>& views, const CharucoBoard& board,
+                         const Lens& lens) {
+  std::vector<double> rms_px;
+  for (const ActiveView& view : views) {
+    rms_px.push_back(reprojection_rms_px(view.corners, board, lens, view.camera_from_board));
+  }
+  const double typical = median(rms_px);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (rms_px[i] < 1.5 * typical) continue;
+    const auto other = estimate_board_pose(views[i].corners, board, lens);
+    if (other && other->rms_px < rms_px[i]) views[i].camera_from_board = other->camera_from_board;
+  }
 }
 
 std::vector<double> corner_errors(const ActiveView& view, const CharucoBoard& board,
@@ -312,12 +328,7 @@ Result<CameraCalibrationReport> calibrate_camera(const std::vector<CalibrationVi
                   "take them again, more varied");
     }
     const Lens lens = lens_of(intrinsics, width, height);
-    for (ActiveView& view : active) {
-      // The first lens may have chosen the wrong one of the two poses a plane allows.
-      const double now_px = reprojection_rms_px(view.corners, board, lens, view.camera_from_board);
-      const auto other = estimate_board_pose(view.corners, board, lens);
-      if (other && other->rms_px < now_px) view.camera_from_board = other->camera_from_board;
-    }
+    choose_better_poses(active, board, lens);
     if (!remove_outliers(active, board, lens, report.views)) break;
     if (const auto enough = check_view_count(active.size(), report.views, options); !enough) {
       return forward(enough);
