@@ -132,6 +132,10 @@ Result<NamedLine> GpioLines::request(const GpioWire& wire, const GpioRequest& re
   }
   auto line = home->request(offset, request);
   if (line) return NamedLine(wire.name, *std::move(line));
+  if (line.error() == ENXIO && request.edges) {
+    return fail(ErrorKind::hardware, line_called(wire.name), "has no interrupt: it can't be heard",
+                "connect this wire to a line of the processor itself");
+  }
   if (line.error() != EBUSY) return line_error(wire.name, "requested", line.error());
   const std::string holder = home->consumer(offset);
   return fail(ErrorKind::hardware, line_called(wire.name),

@@ -269,6 +269,11 @@ Result<void> apply_panel(LampLines& lines, const PanelState& state) {
   return {};
 }
 
+Result<void> in_table(const char* table, Result<void> valid) {
+  if (!valid) valid.error().where = fmt::format("{}.{}", table, valid.error().where);
+  return valid;
+}
+
 /// Hands each line over until the first failure, which it keeps.
 class Fitter {
  public:
@@ -329,8 +334,8 @@ Result<StationHardware> open_gpio_station(const GpioStationConfig& config,
 Result<StationHardware> open_gpio_station(const GpioStationConfig& config,
                                           const TurntableConfig& turntable, Clock& clock,
                                           GpioLines lines) {
-  if (auto ok = config.validate(); !ok) return forward(ok);
-  if (auto ok = turntable.validate(); !ok) return forward(ok);
+  if (auto ok = in_table("gpio", config.validate()); !ok) return forward(ok);
+  if (auto ok = in_table("turntable", turntable.validate()); !ok) return forward(ok);
 
   Fitter fit;
   const auto output = [&](const GpioWire& wire) { return fit([&] { return lines.output(wire); }); };

@@ -195,28 +195,42 @@ class SimulatedStation::World::PanelButton final : public Button {
 class SimulatedStation::World::Lamp final : public SignalLamp {
  public:
   explicit Lamp(World& world) : world_(world) {}
+  ~Lamp() override { set(Signal::off); }
+  Lamp(const Lamp&) = delete;
+  Lamp& operator=(const Lamp&) = delete;
 
   Result<void> show(Signal signal) override {
-    const std::lock_guard lock(world_.mutex);
-    world_.signal = signal;
+    set(signal);
     return {};
   }
 
  private:
+  void set(Signal signal) {
+    const std::lock_guard lock(world_.mutex);
+    world_.signal = signal;
+  }
+
   World& world_;
 };
 
 class SimulatedStation::World::SpecimenLights final : public Lights {
  public:
   explicit SpecimenLights(World& world) : world_(world) {}
+  ~SpecimenLights() override { switch_to(false); }
+  SpecimenLights(const SpecimenLights&) = delete;
+  SpecimenLights& operator=(const SpecimenLights&) = delete;
 
   Result<void> set(bool on) override {
-    const std::lock_guard lock(world_.mutex);
-    world_.lights = on;
+    switch_to(on);
     return {};
   }
 
  private:
+  void switch_to(bool on) {
+    const std::lock_guard lock(world_.mutex);
+    world_.lights = on;
+  }
+
   World& world_;
 };
 
