@@ -45,10 +45,10 @@ struct CameraControl {
 
 /// What every scan locks, so that all views are comparable. Unset: left as the device has it.
 struct CameraSettings {
-  std::optional<std::chrono::microseconds> exposure;
-  std::optional<double> gain;          ///< 1 = none
-  std::optional<int> white_balance_k;  ///< colour temperature
-  std::optional<double> focus;         ///< 0 far … 1 near
+  std::optional<std::chrono::microseconds> exposure = {};
+  std::optional<double> gain = {};          ///< 1 = none
+  std::optional<int> white_balance_k = {};  ///< colour temperature
+  std::optional<double> focus = {};         ///< 0 far … 1 near
 };
 
 /// A setting that was locked: what was asked for and what the device says is in force.

@@ -13,11 +13,11 @@ namespace skullstation {
 /// A camera on the CSI connector (Raspberry Pi and others), which only libcamera can drive. USB
 /// cameras are better served by V4L2: libcamera gives them neither white balance nor focus.
 struct LibcameraConfig {
-  std::string id;                 ///< as list_libcamera_cameras() says; empty: the only one there
-  std::optional<FrameSize> size;  ///< unset: as the camera proposes for still pictures
-  bool allow_other_size = false;  ///< take the size that libcamera makes of it
-  int buffers = 4;                ///< [2, 32]
-  int settle_frames = 3;          ///< discarded after the start, until settings reach the sensor
+  std::string id = {};  ///< as list_libcamera_cameras() says; empty: the only one there
+  std::optional<FrameSize> size = {};  ///< unset: as the camera proposes for still pictures
+  bool allow_other_size = false;       ///< take the size that libcamera makes of it
+  int buffers = 4;                     ///< [2, 32]
+  int settle_frames = 3;  ///< discarded after the start, until settings reach the sensor
 
   Result<void> validate() const;
 };

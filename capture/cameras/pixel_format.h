@@ -39,7 +39,8 @@ struct RawImageFormat {
   int height = 0;
   std::size_t stride_bytes = 0;  ///< from one row to the next; means nothing for JPEG
   YcbcrEncoding encoding = YcbcrEncoding::bt601;
-  std::optional<SampleRange> range;  ///< unset: limited for Y'CbCr, full for the rest, as in V4L2
+  std::optional<SampleRange> range =
+      {};  ///< unset: limited for Y'CbCr, full for the rest, as in V4L2
   bool linear_light =
       false;  ///< grey and Bayer samples proportional to light: sRGB curve is applied
 };

@@ -13,15 +13,15 @@ namespace skullstation {
 
 struct V4l2CameraConfig {
   /// "/dev/v4l/by-id/...", "/dev/v4l/by-path/...", "/dev/video0" or "bus:..." (stable_path_of()).
-  std::string device;
-  V4l2FormatRequest format;
+  std::string device = {};
+  V4l2FormatRequest format = {};
   /// Asked of the driver, which may grant more or fewer [2, 32].
   int buffers = 4;
   /// Frames discarded after the start and after lock(), until the settings have reached the sensor:
   /// UVC cameras take up to three.
   int settle_frames = 3;
   /// Steps of the device's gain control that raise the gain by 1; unset: only gain 1 can be locked.
-  std::optional<double> gain_steps_per_unit;
+  std::optional<double> gain_steps_per_unit = {};
 
   Result<void> validate() const;
 };

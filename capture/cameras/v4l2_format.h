@@ -27,10 +27,10 @@ struct V4l2OfferedFormat {
 
 /// What to ask a device for. Whatever is unset is chosen.
 struct V4l2FormatRequest {
-  std::optional<FrameSize> size;            ///< unset: the largest offered
-  std::optional<std::string> format;        ///< four-character code; unset: the best offered
-  std::optional<double> frames_per_second;  ///< unset: as the device has it
-  bool allow_other_size = false;            ///< take the size the driver makes of it
+  std::optional<FrameSize> size = {};            ///< unset: the largest offered
+  std::optional<std::string> format = {};        ///< four-character code; unset: the best offered
+  std::optional<double> frames_per_second = {};  ///< unset: as the device has it
+  bool allow_other_size = false;                 ///< take the size the driver makes of it
 };
 
 /// What the device will stream.

@@ -200,9 +200,9 @@ int ScriptedV4l2::set_format(Opened& opened, v4l2_format& format) const {
   }
   if (camera.format_answer) pixels.pixelformat = *camera.format_answer;
   pixels.field = camera.field_answer;
-  pixels.bytesperline = static_cast<std::uint32_t>(
-      bytes_per_row(pixels.pixelformat, pixels.width) + camera.stride_padding);
-  pixels.sizeimage = std::max<std::uint32_t>(pixels.bytesperline * pixels.height * 2, 4096);
+  pixels.bytesperline = static_cast<std::uint32_t>(bytes_per_row(pixels.pixelformat, pixels.width) +
+                                                   camera.stride_padding);
+  pixels.sizeimage = std::max(2 * pixels.bytesperline, 3 * pixels.width) * pixels.height;
   pixels.colorspace = camera.colorspace;
   pixels.ycbcr_enc = camera.ycbcr_encoding;
   opened.format = pixels;
@@ -241,8 +241,7 @@ int ScriptedV4l2::query_control(const ScriptedCamera& camera, v4l2_query_ext_ctr
   return -EINVAL;
 }
 
-int ScriptedV4l2::access_control(ScriptedCamera& camera, v4l2_ext_controls& batch,
-                                 bool set) const {
+int ScriptedV4l2::access_control(ScriptedCamera& camera, v4l2_ext_controls& batch, bool set) const {
   v4l2_ext_control& entry = *batch.controls;
   for (ScriptedControl& control : camera.controls) {
     if (control.id != entry.id) continue;
@@ -310,11 +309,10 @@ void ScriptedV4l2::fill(Opened& opened, const ScriptedFrame& frame) const {
     std::copy_n(picture.begin(), buffer.used, buffer.memory.begin());
   } else {
     const auto pixels = pixel_format_from_fourcc(opened.format.pixelformat);
-    buffer.used =
-        buffer_bytes({.pixels = *pixels,
-                      .width = static_cast<int>(opened.format.width),
-                      .height = static_cast<int>(opened.format.height),
-                      .stride_bytes = opened.format.bytesperline});
+    buffer.used = buffer_bytes({.pixels = *pixels,
+                                .width = static_cast<int>(opened.format.width),
+                                .height = static_cast<int>(opened.format.height),
+                                .stride_bytes = opened.format.bytesperline});
     std::fill_n(buffer.memory.begin(), buffer.used, camera.fill);
   }
   buffer.flags = camera.timestamp_flags | (frame.damaged ? V4L2_BUF_FLAG_ERROR : 0U);

@@ -37,9 +37,9 @@ struct ScriptedControl {
 /// What goes wrong with one frame.
 struct ScriptedFrame {
   bool dropped = false;
-  bool damaged = false;                                    ///< V4L2_BUF_FLAG_ERROR
-  std::chrono::nanoseconds age{0};                         ///< its timestamp lies that far back
-  std::optional<std::vector<std::uint8_t>> bytes = {};     ///< instead of the camera's picture
+  bool damaged = false;                                 ///< V4L2_BUF_FLAG_ERROR
+  std::chrono::nanoseconds age{0};                      ///< its timestamp lies that far back
+  std::optional<std::vector<std::uint8_t>> bytes = {};  ///< instead of the camera's picture
 };
 
 /// One video node. The picture's bytes are `fill` everywhere unless given.
@@ -55,20 +55,19 @@ struct ScriptedCamera {
   std::chrono::nanoseconds frame_interval = std::chrono::milliseconds(40);
   bool rate_settable = true;
   std::size_t stride_padding = 0;
-  std::optional<FrameSize> size_answer = {};            ///< what the driver makes of any size
-  std::optional<std::uint32_t> format_answer = {};      ///< and of any format
+  std::optional<FrameSize> size_answer = {};        ///< what the driver makes of any size
+  std::optional<std::uint32_t> format_answer = {};  ///< and of any format
   std::uint32_t field_answer = V4L2_FIELD_NONE;
   std::uint32_t colorspace = V4L2_COLORSPACE_SRGB;
   std::uint32_t ycbcr_encoding = V4L2_YCBCR_ENC_DEFAULT;
-  std::uint32_t timestamp_flags =
-      V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+  std::uint32_t timestamp_flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   std::uint32_t most_buffers = 32;
-  std::vector<std::uint8_t> picture = {};               ///< empty: `fill` everywhere
+  std::vector<std::uint8_t> picture = {};  ///< empty: `fill` everywhere
   std::uint8_t fill = 128;
-  std::deque<ScriptedFrame> script = {};                ///< the next frames; then good ones
+  std::deque<ScriptedFrame> script = {};  ///< the next frames; then good ones
   bool all_dropped = false;
-  bool hangs_up = false;                                ///< poll: POLLERR, while DQBUF: EAGAIN
-  std::map<unsigned long, std::deque<int>> errors = {}; ///< errno of the next calls per request
+  bool hangs_up = false;                                 ///< poll: POLLERR, while DQBUF: EAGAIN
+  std::map<unsigned long, std::deque<int>> errors = {};  ///< errno of the next calls per request
   int open_error = 0;
   bool maps = true;
 };
