@@ -125,28 +125,25 @@ double detail_energy(const cv::Mat& image, const cv::Mat* earlier, const cv::Mat
 double sharpness(const cv::Mat& grey, const cv::Mat* earlier, const cv::Mat& specimen) {
   cv::Mat inside;  // silhouettes are strong edges in any view
   cv::erode(specimen, inside, cv::Mat(), {-1, -1}, 3, cv::BORDER_CONSTANT, cv::Scalar(0));
-  const cv::Mat half = reduced(grey, 2);
-  cv::Mat earlier_half;
-  if (earlier != nullptr) earlier_half = reduced(*earlier, 2);
+  const cv::Mat quarter = reduced(grey, 4);
+  cv::Mat earlier_quarter;
+  if (earlier != nullptr) earlier_quarter = reduced(*earlier, 4);
   const double fine = detail_energy(grey, earlier, inside);
-  const double coarse = detail_energy(half, earlier != nullptr ? &earlier_half : nullptr, inside);
+  const double coarse =
+      detail_energy(quarter, earlier != nullptr ? &earlier_quarter : nullptr, inside);
   return coarse > 0.0 ? fine / coarse : 0.0;
 }
 
 // ---- motion ----
 
-/// Shift of one block between two frames, by least squares on brightness constancy (Lucas &
-/// Kanade 1981) with a change of gain and offset, so that flicker is no motion.
-struct BlockShift {
-  double length_px = 0.0;
-  double standard_error_px = 0.0;
-};
-
-std::optional<BlockShift> block_shift(const cv::Mat& before, const cv::Mat& after, cv::Rect block) {
+/// Shift [px] of a block between two frames, by least squares on brightness constancy (Lucas &
+/// Kanade 1981) with a change of gain and offset, so that flicker is no motion. Nothing for a
+/// block without enough texture: one where noise of `noise_sd` grey levels could shift the result
+/// by more than `certain_px`.
+std::optional<double> block_shift(const cv::Mat& before, const cv::Mat& after, cv::Rect block,
+                                  double noise_sd, double certain_px) {
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
   Eigen::Vector4d right = Eigen::Vector4d::Zero();
-  double square_sum = 0.0;
-  int pixels = 0;
   for (int y = std::max(1, block.y); y < std::min(before.rows - 1, block.y + block.height); ++y) {
     for (int x = std::max(1, block.x); x < std::min(before.cols - 1, block.x + block.width); ++x) {
       // Gradients of the mean of both frames: half the noise, and symmetric in time.
@@ -159,23 +156,20 @@ std::optional<BlockShift> block_shift(const cv::Mat& before, const cv::Mat& afte
       const Eigen::Vector4d row(-gx, -gy, sum(y, x) / 512.0, 1.0);
       normal += row * row.transpose();
       right += row * change;
-      square_sum += change * change;
-      ++pixels;
     }
   }
-  if (pixels < 64) return std::nullopt;
   const Eigen::LDLT<Eigen::Matrix4d> solver(normal + 1e-6 * Eigen::Matrix4d::Identity());
-  const Eigen::Vector4d solution = solver.solve(right);
-  const double residual = std::max(0.0, square_sum - solution.dot(right)) / (pixels - 4);
-  const Eigen::Matrix4d covariance = residual * solver.solve(Eigen::Matrix4d::Identity());
-  return BlockShift{solution.head<2>().norm(),
-                    std::sqrt(std::max(0.0, covariance.topLeftCorner<2, 2>().trace()))};
+  const Eigen::Matrix4d inverse = solver.solve(Eigen::Matrix4d::Identity());
+  if (noise_sd * std::sqrt(inverse.topLeftCorner<2, 2>().trace()) > certain_px) return std::nullopt;
+  return solver.solve(right).head<2>().norm();
 }
 
-/// Upper quartile of the blocks' shifts, in pixels of the full image; 0 if no block is certain.
+/// Upper quartile of the blocks' shifts, in pixels of the full image; 0 if no block has texture.
 double upper_quartile_shift(const cv::Mat& before, const cv::Mat& after, const cv::Mat& turning,
                             int scale, int block_side) {
-  constexpr double certain_px = 0.1;  // of the full image
+  constexpr double certain_px = 0.15;  // of the full image
+  // Of the difference of two frames after reduction and smoothing, on the safe side.
+  constexpr double noise_sd = 2.0;
   std::vector<double> shifts;
   for (int y = 0; y + block_side <= before.rows; y += block_side) {
     for (int x = 0; x + block_side <= before.cols; x += block_side) {
@@ -185,10 +179,9 @@ double upper_quartile_shift(const cv::Mat& before, const cv::Mat& after, const c
           turning.at<std::uint8_t>(mask_y, mask_x) == 0) {
         continue;
       }
-      const auto shift = block_shift(before, after, {x, y, block_side, block_side});
-      if (shift && shift->standard_error_px * scale < certain_px) {
-        shifts.push_back(shift->length_px * scale);
-      }
+      const auto shift =
+          block_shift(before, after, {x, y, block_side, block_side}, noise_sd, certain_px / scale);
+      if (shift) shifts.push_back(*shift * scale);
     }
   }
   if (shifts.empty()) return 0.0;
@@ -198,11 +191,17 @@ double upper_quartile_shift(const cv::Mat& before, const cv::Mat& after, const c
 }
 
 double motion_px(const cv::Mat& before, const cv::Mat& after, const cv::Mat& turning) {
-  // The fine level measures what the gate decides on; the coarse one sees shifts that are too
-  // large for the fine one's linearisation.
+  // Finite differences take the slope of a hard edge too low, and so its shift too high.
+  const auto smooth = [](const cv::Mat& image, int scale) {
+    cv::Mat smoothed;
+    cv::GaussianBlur(reduced(image, scale), smoothed, {5, 5}, 1.0);
+    return smoothed;
+  };
+  // The fine level measures what the gate decides on; the coarse one notices shifts that are too
+  // large for the fine one's linearisation, of which it can't tell the size.
   double motion = 0.0;
   for (const auto& [scale, block_side] : {std::pair{2, 32}, std::pair{8, 16}}) {
-    motion = std::max(motion, upper_quartile_shift(reduced(before, scale), reduced(after, scale),
+    motion = std::max(motion, upper_quartile_shift(smooth(before, scale), smooth(after, scale),
                                                    turning, scale, block_side));
   }
   return motion;

@@ -82,7 +82,7 @@ int finish(const Result<CommandReport>& result, bool json) {
   if (result) {
     const std::string& text = json ? result->json : result->text;
     fmt::print("{}{}", text, text.empty() || text.back() == '\n' ? "" : "\n");
-    return 0;
+    return result->exit_code;
   }
   const Error& error = result.error();
   fmt::print(stderr, "skullstation: {}\n", error.message());

@@ -24,6 +24,7 @@ struct CommonOptions {
 struct CommandReport {
   std::string text;
   std::string json;
+  int exit_code = 0;  ///< not 0: the command did its work, and what it found is bad
 };
 
 /// Progress on stderr: a bar with the remaining time on a terminal, a line every tenth elsewhere.

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/progress.h"
+#include "core/result.h"
+#include "daemon/cli/terminal.h"
+
+namespace skullstation {
+
+// Every command is a plain struct of its options and a run() that gives its report. main_cli.cpp
+// makes the structs from the command line; one .cpp a command group runs them. An empty `config`
+// means the simulated station with its defaults.
+
+/// The whole main job on a simulated station.
+struct DemoCommand {
+  std::filesystem::path out = "out/demo";
+};
+Result<CommandReport> run(const DemoCommand&, const CommonOptions&, const Progress&);
+
+/// Photographs a specimen all round; an unfinished session in `out` is resumed.
+struct ScanCommand {
+  std::filesystem::path config;
+  std::filesystem::path out;
+  std::string case_number;
+};
+Result<CommandReport> run(const ScanCommand&, const CommonOptions&, const Progress&);
+
+/// Intrinsics of a camera from photographs of the board in many poses.
+struct CalibrateCameraCommand {
+  std::filesystem::path config;
+  std::string camera;            ///< id in station.toml; empty: the only one
+  std::filesystem::path images;  ///< photographs of the board; empty: take them now
+  std::filesystem::path out;     ///< file; empty: in the station's calibration folder
+};
+Result<CommandReport> run(const CalibrateCameraCommand&, const CommonOptions&, const Progress&);
+
+/// Axis, board and camera positions; checks steps per turn and direction.
+struct CalibrateTableCommand {
+  std::filesystem::path config;
+  std::filesystem::path out;  ///< file; empty: in the station's calibration folder
+  int stops = 24;             ///< angles over one turn
+};
+Result<CommandReport> run(const CalibrateTableCommand&, const CommonOptions&, const Progress&);
+
+/// Writes the station's board as an SVG that prints at its true size.
+struct BoardCommand {
+  std::filesystem::path config;
+  std::filesystem::path out;
+};
+Result<CommandReport> run(const BoardCommand&, const CommonOptions&, const Progress&);
+
+/// Is a session readable, and are all its images intact?
+struct SessionCheckCommand {
+  std::filesystem::path session;
+};
+Result<CommandReport> run(const SessionCheckCommand&, const CommonOptions&, const Progress&);
+
+/// Names every mistake in a station.toml.
+struct ConfigCheckCommand {
+  std::filesystem::path config;
+};
+Result<CommandReport> run(const ConfigCheckCommand&, const CommonOptions&, const Progress&);
+
+/// All values in force, their meaning and their origin.
+struct ConfigShowCommand {
+  std::filesystem::path config;
+};
+Result<CommandReport> run(const ConfigShowCommand&, const CommonOptions&, const Progress&);
+
+/// Checks devices, space and calibration, and says what to mend.
+struct DoctorCommand {
+  std::filesystem::path config;
+};
+Result<CommandReport> run(const DoctorCommand&, const CommonOptions&, const Progress&);
+
+}  // namespace skullstation

@@ -1,0 +1,131 @@
+// The `skullstation` program: its command line. What the commands do is in daemon/cli.
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <functional>
+#include <memory>
+
+#include "daemon/cli/commands.h"
+#include "daemon/cli/terminal.h"
+
+namespace {
+
+using namespace skullstation;
+
+/// What the command line chose: set by the parser's callback, run afterwards.
+using Command = std::function<Result<CommandReport>(const CommonOptions&, const Progress&)>;
+
+/// Adds a command; `declare(app, options)` declares the options of its struct.
+template <class Options, class Declare>
+void add(CLI::App& parent, const std::string& name, const std::string& help, Command& chosen,
+         const Declare& declare) {
+  CLI::App* app = parent.add_subcommand(name, help);
+  const auto options = std::make_shared<Options>();
+  declare(*app, *options);
+  app->callback([&chosen, options] {
+    chosen = [options](const CommonOptions& common, const Progress& progress) {
+      return run(*options, common, progress);
+    };
+  });
+}
+
+constexpr const char* config_help = "station.toml; without it: a simulated station, all defaults";
+
+void add_commands(CLI::App& app, Command& chosen) {
+  add<DemoCommand>(app, "demo", "the whole main job on a simulated station", chosen,
+                   [](CLI::App& demo, DemoCommand& o) {
+                     demo.add_option("--out", o.out, "where the results go")->capture_default_str();
+                   });
+
+  add<ScanCommand>(app, "scan", "photograph a specimen all round; resumes an unfinished session",
+                   chosen, [](CLI::App& scan, ScanCommand& o) {
+                     scan.add_option("--out", o.out, "the session's folder")->required();
+                     scan.add_option("--config", o.config, config_help);
+                     scan.add_option("--case", o.case_number, "case number");
+                   });
+
+  CLI::App* calibrate = app.add_subcommand("calibrate", "measure cameras and table");
+  calibrate->require_subcommand(1);
+  add<CalibrateCameraCommand>(
+      *calibrate, "camera", "intrinsics from photographs of the board in many poses", chosen,
+      [](CLI::App& camera, CalibrateCameraCommand& o) {
+        camera.add_option("--config", o.config, config_help);
+        camera.add_option("--camera", o.camera, "which camera (default: the only one)");
+        camera.add_option("--images", o.images, "folder of photographs (default: take them now)");
+        camera.add_option("--out", o.out, "file (default: in the station's calibration folder)");
+      });
+  add<CalibrateTableCommand>(
+      *calibrate, "table", "axis, board and camera positions; checks steps per turn", chosen,
+      [](CLI::App& table, CalibrateTableCommand& o) {
+        table.add_option("--config", o.config, config_help);
+        table.add_option("--stops", o.stops, "angles over one turn")
+            ->capture_default_str()
+            ->check(CLI::Range(6, 360));
+        table.add_option("--out", o.out, "file (default: in the station's calibration folder)");
+      });
+  add<BoardCommand>(*calibrate, "board", "write the board as an SVG that prints at its true size",
+                    chosen, [](CLI::App& board, BoardCommand& o) {
+                      board.add_option("--config", o.config, config_help);
+                      board.add_option("--out", o.out, "SVG file")->required();
+                    });
+
+  CLI::App* session = app.add_subcommand("session", "look after capture sessions");
+  session->require_subcommand(1);
+  add<SessionCheckCommand>(
+      *session, "check", "is a session readable and are all its images intact?", chosen,
+      [](CLI::App& check, SessionCheckCommand& o) {
+        check.add_option("SESSION", o.session, "the session's folder")->required();
+      });
+
+  CLI::App* config = app.add_subcommand("config", "check or show the configuration");
+  config->require_subcommand(1);
+  add<ConfigCheckCommand>(*config, "check", "every mistake in a station.toml, with its line",
+                          chosen, [](CLI::App& check, ConfigCheckCommand& o) {
+                            check.add_option("FILE", o.config, "station.toml")->required();
+                          });
+  add<ConfigShowCommand>(*config, "show",
+                         "all values in force, their meaning and where they come from", chosen,
+                         [](CLI::App& show, ConfigShowCommand& o) {
+                           show.add_option("--config", o.config, config_help);
+                         });
+
+  add<DoctorCommand>(app, "doctor", "check devices, space and calibration; say what to mend",
+                     chosen, [](CLI::App& doctor, DoctorCommand& o) {
+                       doctor.add_option("--config", o.config, config_help);
+                     });
+}
+
+void add_common_options(CLI::App& app, CommonOptions& common) {
+  app.add_flag("--json", common.json, "print one JSON object with the figures");
+  app.add_option("--threads", common.threads, "0: all")->check(CLI::Range(0, 1024));
+  app.add_option("--seed", common.seed, "of everything random")->capture_default_str();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const StopOnSignal stop;
+
+  CLI::App app{"Skullstation: from a skull on a turntable to a facial approximation"};
+  app.set_version_flag("--version", SKULLSTATION_VERSION);
+  app.require_subcommand(1);
+  app.fallthrough();  // the common flags may stand anywhere
+  CommonOptions common;
+  add_common_options(app, common);
+  Command chosen;
+  add_commands(app, chosen);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const bool asked_for_help = error.get_exit_code() == 0;
+    app.exit(error);
+    return asked_for_help ? 0 : exit_code(ErrorKind::usage);
+  }
+  Result<CommandReport> result;
+  {
+    ProgressBar bar;
+    result = chosen(common, bar.progress(stop.token()));
+  }
+  return finish(result, common.json);
+}

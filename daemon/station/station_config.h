@@ -1,0 +1,104 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/cameras/camera.h"
+#include "capture/scan/image_quality.h"
+#include "capture/scan/scan_plan.h"
+#include "capture/simulation/simulated_camera.h"
+#include "core/result.h"
+#include "core/session/charuco_board.h"
+#include "core/session/lens.h"
+#include "daemon/station/config_fields.h"
+#include "firmware_io/gpio_station.h"
+#include "firmware_io/simulated_station.h"
+#include "firmware_io/turntable_config.h"
+
+namespace skullstation {
+
+enum class StationBackend { simulated, gpio };
+enum class CameraBackend { simulated, v4l2, libcamera, replay };
+
+/// Where a simulated camera stands, how it sees and what is wrong with it.
+struct SimulatedView {
+  double azimuth_deg = -90.0;  ///< -90 looks at the face of a specimen that faces -y
+  double elevation_deg = 15.0;
+  double distance_mm = 700.0;        ///< to a point 75 mm above the table, on the axis
+  double focal_px_per_width = 1.75;  ///< focal length over image width
+  double centre_offset_x_px = 7.3;   ///< of the principal point from the image centre
+  double centre_offset_y_px = -3.9;
+  double k1 = -0.08, k2 = 0.03, p1 = 0.0004, p2 = -0.0003;  ///< OPENCV's distortion
+  SimulatedCameraFaults faults;
+};
+
+struct CameraConfig {
+  std::string id = "cam0";
+  CameraBackend backend = CameraBackend::simulated;
+  std::string device;  ///< /dev/v4l/by-id/…, a libcamera id, a folder to replay
+  int width = 1600;
+  int height = 1200;
+  std::string format;  ///< V4L2 four-character code; empty: the best that the device offers
+  std::optional<double> focal_length_mm;  ///< for EXIF
+  CameraSettings settings;
+  std::optional<double> gain_steps_per_unit;  ///< V4l2CameraConfig
+  SimulatedView simulated;
+};
+
+struct ScanConfig {
+  int passes = 2;
+  int views_per_ring = 24;
+  ImageFormat image_format = ImageFormat::png;
+  int jpeg_quality = 95;
+  std::chrono::milliseconds settle_time{800};
+  std::chrono::milliseconds frame_timeout{5000};
+  int max_attempts = 3;
+};
+
+struct SimulationConfig {
+  /// PLY file in mm, +z up, face towards -y; empty: the built-in synthetic skull.
+  std::string specimen;
+  int render_samples = 4;
+  SimulatedFaults faults;
+};
+
+/// The content of station.toml. What a file does not say keeps these defaults, which make a
+/// simulated station with two cameras.
+struct StationConfig {
+  std::string station_id = "SIM-01";
+  StationBackend backend = StationBackend::simulated;
+  /// Folder of camera-<id>.json and table.json.
+  std::string calibration_folder = "calibration";
+  int calibration_valid_days = 90;
+  TurntableConfig turntable;
+  GpioStationConfig gpio;
+  std::vector<CameraConfig> cameras = simulated_pair();
+  bool has_board = true;
+  CharucoBoard board;
+  ScanConfig scan;
+  QualityGates gates;
+  SimulationConfig simulation;
+
+  static std::vector<CameraConfig> simulated_pair();
+};
+
+/// Every key of station.toml: its place, its default and its meaning.
+void visit_config(StationConfig& config, ConfigFields& fields);
+
+struct LoadedConfig {
+  StationConfig config;
+  std::map<std::string, std::string> origins;  ///< "turntable.backlash_deg" -> "station.toml:7"
+  std::vector<Error> problems;                 ///< in the file's order; empty: all is well
+};
+
+/// Reads and validates. An empty path gives the defaults.
+LoadedConfig load_config(const std::filesystem::path& file);
+
+/// The same for who wants a usable configuration or the first problem.
+Result<StationConfig> read_config(const std::filesystem::path& file);
+
+}  // namespace skullstation
