@@ -100,7 +100,7 @@ class LibcameraCamera final : public Camera {
  private:
   Result<void> start(const libcamera::ControlList& controls);
   Result<std::vector<LockedSetting>> wait_for_settings(const libcamera::ControlList& asked);
-  std::optional<Frame> frame_from(const libcamera::Request& request, Instant not_before,
+  std::optional<Frame> frame_from(libcamera::Request& request, Instant not_before,
                                   DiscardedFrames& discarded);
   std::optional<Instant> exposure_start(const libcamera::Request& request);
   bool settings_in_use(const libcamera::ControlList& metadata) const;
@@ -168,10 +168,9 @@ Result<Frame> LibcameraCamera::frame_after(Instant not_before, milliseconds time
               "reopen the camera; if it happens again, check its cable");
 }
 
-std::optional<Frame> LibcameraCamera::frame_from(const libcamera::Request& request,
-                                                 Instant not_before, DiscardedFrames& discarded) {
-  // metadata() is not const in libcamera although reading it changes nothing.
-  last_metadata_ = const_cast<libcamera::Request&>(request).metadata();
+std::optional<Frame> LibcameraCamera::frame_from(libcamera::Request& request, Instant not_before,
+                                                 DiscardedFrames& discarded) {
+  last_metadata_ = request.metadata();
   const libcamera::FrameBuffer& buffer = stream_->buffer_of(request);
   const std::optional<Instant> start = exposure_start(request);
   if (buffer.metadata().status != libcamera::FrameMetadata::FrameSuccess) {
