@@ -128,7 +128,7 @@ Result<NamedLine> GpioLines::request(const GpioWire& wire, const GpioRequest& re
   if (home == nullptr) {
     return fail(ErrorKind::hardware, line_called(wire.name),
                 fmt::format("not found on {}", described(chips_)),
-                "`gpioinfo` lists the lines; put the right name into the [gpio] tables");
+                "`gpioinfo` lists the lines; put the right one into the [gpio] tables");
   }
   auto line = home->request(offset, request);
   if (line) return NamedLine(wire.name, *std::move(line));

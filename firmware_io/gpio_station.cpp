@@ -30,7 +30,7 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr auto chip_gone_text = "GPIO chip is gone";
-constexpr auto longest_wait = std::chrono::hours{24 * 365};
+constexpr std::chrono::milliseconds longest_wait = std::chrono::hours{24 * 365};
 /// The levels are looked at this often even if no edge was told of (kernels before 6.6 don't wake
 /// a poll when a chip is removed, and a full edge queue drops edges).
 constexpr auto level_check_period = 250ms;
@@ -66,8 +66,7 @@ class Panel {
 
   Result<std::optional<Press>> wait_for_press(std::chrono::milliseconds timeout,
                                               std::stop_token stop) {
-    const Instant deadline =
-        clock_.now() + std::min<std::chrono::nanoseconds>(timeout, longest_wait);
+    const Instant deadline = clock_.now() + std::min(timeout, longest_wait);
     std::unique_lock lock(mutex_);
     pressed_.wait_until(lock, stop, deadline, [&] { return !presses_.empty() || deaf_; });
     if (!presses_.empty()) {
@@ -303,13 +302,13 @@ Result<void> GpioStationConfig::validate() const {
   std::set<std::string> names;
   const auto used_twice = [&](const char* key, const GpioWire& wire) -> Result<void> {
     if (wire.name.empty() || names.insert(wire.name).second) return {};
-    return fail(ErrorKind::bad_input, fmt::format("{}.name", key),
+    return fail(ErrorKind::bad_input, fmt::format("{}.line", key),
                 fmt::format("\"{}\" is the name of another line too", wire.name),
                 "give each end its own line");
   };
   for (const auto& [key, wire] : required) {
     if (wire->name.empty()) {
-      return fail(ErrorKind::bad_input, fmt::format("{}.name", key),
+      return fail(ErrorKind::bad_input, fmt::format("{}.line", key),
                   "is empty; this line must be fitted", "`gpioinfo` lists the lines");
     }
     if (auto ok = used_twice(key, *wire); !ok) return ok;

@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr auto estop_pressed_text = "emergency stop pressed";
-constexpr auto longest_wait = std::chrono::hours{24 * 365};
+constexpr std::chrono::milliseconds longest_wait = std::chrono::hours{24 * 365};
 constexpr auto pause_between_presses = 100ms;
 
 /// What a contact does around the moment `at`: one clean edge, or a burst that ends at `down`.
@@ -95,8 +95,7 @@ struct SimulatedStation::World {
 
   Result<std::optional<Press>> wait_for_press(std::chrono::milliseconds timeout,
                                               std::stop_token stop) {
-    const Instant deadline =
-        clock.now() + std::min<std::chrono::nanoseconds>(timeout, longest_wait);
+    const Instant deadline = clock.now() + std::min(timeout, longest_wait);
     for (;;) {
       std::stop_source wake;
       Instant until = deadline;

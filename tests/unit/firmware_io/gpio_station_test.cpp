@@ -113,10 +113,10 @@ TEST_F(GpioStationTest, WhatIsNotFittedIsNotMissed) {
 
 TEST_F(GpioStationTest, ValidatesWithTheKeyThatIsWrong) {
   config_.step.name.clear();
-  EXPECT_THAT(message(), HasSubstr("gpio.step.name: is empty; this line must be fitted"));
+  EXPECT_THAT(message(), HasSubstr("gpio.step.line: is empty; this line must be fitted"));
   config_ = {};
   config_.lights.name = "estop";
-  EXPECT_THAT(message(), HasSubstr("gpio.lights.name: \"estop\" is the name of another line too"));
+  EXPECT_THAT(message(), HasSubstr("gpio.lights.line: \"estop\" is the name of another line too"));
   config_ = {};
   config_.step_pulse = 1us;
   EXPECT_THAT(message(), HasSubstr("gpio.step_pulse_us: is 1; 2 to 200 was expected"));

@@ -43,7 +43,7 @@ TEST(SignalPattern, LooksAndSoundsAsTheOperatorLearnt) {
 
 TEST(SignalPattern, NextChangeMissesNone) {
   for (const Signal signal : signals) {
-    for (milliseconds t{0}; t < 5s; t += 7ms) {
+    for (milliseconds t{0}; t < 5s; t += 61ms) {
       const auto next = next_change(signal, t);
       const milliseconds end = next.value_or(t + 5s);
       ASSERT_GT(end, t);
