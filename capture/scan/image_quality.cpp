@@ -37,6 +37,25 @@ cv::Mat reduced(const cv::Mat& image, int factor) {
   return smaller;
 }
 
+// ---- board ----
+
+/// Half the resolution shows all but the smallest markers in a fraction of the time; where it does
+/// not, the whole is looked at.
+std::vector<BoardCorner> board_corners(const Image8& grey, const CharucoBoard& board) {
+  constexpr int large_px = 1000;
+  constexpr int enough_share = 4;  // a quarter of all corners
+  if (std::max(grey.width, grey.height) >= large_px) {
+    Image8 half(grey.width / 2, grey.height / 2, 1);
+    reduced(view_of(grey), 2).copyTo(view_of(half));
+    std::vector<BoardCorner> corners = detect_board(half, board);
+    if (static_cast<int>(corners.size()) * enough_share >= board.corner_count()) {
+      for (BoardCorner& corner : corners) corner.position_px *= 2.0;
+      return corners;
+    }
+  }
+  return detect_board(grey, board);
+}
+
 // ---- levels and the frame's border ----
 
 void measure_levels(const Image8& image, const Image8& grey, const Image8& specimen,
@@ -214,7 +233,7 @@ ViewQuality measure_view(const Image8& image, const Image8* earlier,
   ViewQuality quality;
   const Image8 grey = grey_of(image);
   std::vector<BoardCorner> corners;
-  if (board) corners = detect_board(grey, *board);
+  if (board) corners = board_corners(grey, *board);
   quality.board_corners = static_cast<int>(corners.size());
 
   const ViewRegions regions = find_specimen(grey, corners, board);

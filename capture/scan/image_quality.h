@@ -15,9 +15,9 @@ namespace skullstation {
 /// skull (docs/sessions.md, "Gates").
 struct QualityGates {
   /// Sharpness (see measure_view) below this is out of focus or blurred, whatever the specimen.
-  double min_sharpness = 0.1;
+  double min_sharpness = 0.02;
   /// … and so is less than this part of the median of the same camera's accepted views.
-  double min_sharpness_of_median = 0.5;
+  double min_sharpness_of_median = 0.2;
   int views_for_median = 5;  ///< the comparison begins with so many accepted views
   double max_clipped_percent = 1.0;
   double max_dark_percent = 40.0;
@@ -37,9 +37,9 @@ struct QualityGates {
 /// before (null if there is none: motion_px stays 0). With it, noise is removed exactly, since it
 /// is independent between the two; without it, it is estimated (Immerkær 1996).
 ///
-/// - sharpness: gradient energy of the specimen at full resolution over that at half resolution,
-///   noise removed from both. The ratio hardly depends on the specimen's contrast or on the side
-///   that faces the camera, but falls steeply with blur.
+/// - sharpness: energy of the specimen's finest detail (Laplacian at full resolution) over that
+///   of detail four times as coarse, noise removed from both. The ratio does not depend on the
+///   specimen's contrast and little on the side that faces the camera; it falls steeply with blur.
 /// - motion_px: least-squares shift (Lucas & Kanade 1981) of blocks of the specimen and the board
 ///   between the two frames; the upper quartile of the blocks, so that a turn about an axis inside
 ///   the image shows as well as a shift.

@@ -179,7 +179,8 @@ Result<void> Scan::look_through_all_cameras() {
 
 Result<void> Scan::prepare_pass(int pass) {
   const bool continued = recorder_.recorded_in_pass(pass) > 0;
-  const bool begins_new_session = recorder_.session().views.empty() && pass == 0;
+  const bool begins_new_session =
+      pass == 0 && recorder_.session().views.empty() && recorder_.replaced().empty();
   if (!begins_new_session) {
     // Hands are at the platter now: it must not be able to move.
     if (Result<void> released = station_.hardware.turntable->release(); !released) return released;
