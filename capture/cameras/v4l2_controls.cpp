@@ -72,7 +72,14 @@ int access(const V4l2Device& device, unsigned long request, const Control& contr
   batch.count = 1;
   batch.controls = &entry;
   const int outcome = device.ioctl(request, &batch);
-  if (outcome >= 0) value = wide ? std::int64_t{entry.value64} : std::int64_t{entry.value};
+  if (outcome < 0) return outcome;
+  if (wide) {
+    value = entry.value64;
+  } else if (control.type == V4L2_CTRL_TYPE_BITMASK) {
+    value = static_cast<std::uint32_t>(entry.value);  // its topmost bit is no sign
+  } else {
+    value = entry.value;
+  }
   return outcome;
 }
 

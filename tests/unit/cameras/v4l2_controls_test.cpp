@@ -93,6 +93,14 @@ TEST_F(V4l2Controls, WhatIsNoReadableNumberIsLeftOut) {
   EXPECT_TRUE(controls->front().read_only);
 }
 
+TEST_F(V4l2Controls, ABitMaskIsNeverNegative) {
+  camera_->controls = {{8, "Mask", V4L2_CTRL_TYPE_BITMASK, 0, 0x80402010, 0, 0x80002000}};
+  const auto controls = list_v4l2_controls(*device_);
+  ASSERT_TRUE(controls);
+  ASSERT_EQ(controls->size(), 1U);
+  EXPECT_EQ(controls->front().value, 0x80002000);
+}
+
 TEST_F(V4l2Controls, ListingAnUnpluggedCameraIsAnError) {
   system_->unplug(0);
   const auto controls = list_v4l2_controls(*device_);
