@@ -152,6 +152,7 @@ Result<SessionRecorder> SessionRecorder::open(const fs::path& folder, Session wa
     if (Result<void> free = check_folder_is_free(folder, recorder.planned_); !free) {
       return forward(free);
     }
+    recorder.remove_leftovers();
     return recorder;
   }
   Result<Session> session = read_session(folder);
@@ -171,6 +172,7 @@ Result<SessionRecorder> SessionRecorder::open(const fs::path& folder, Session wa
   }
   recorder.session_ = std::move(*session);
   recorder.resumed_ = true;
+  recorder.remove_leftovers();
   if (Result<void> kept = recorder.keep_intact_views(progress); !kept) return forward(kept);
   return recorder;
 }
@@ -240,15 +242,23 @@ Result<void> SessionRecorder::set_image_size(const std::string& camera, int widt
 Result<void> SessionRecorder::begin() {
   if (Result<void> made = make_writable_folder(folder_ / images_folder); !made) return made;
   if (Result<void> written = write_session_file(); !written) return written;
-  std::error_code ignored;
-  fs::remove(folder_ / (std::string("session.json") + part_suffix), ignored);
-  std::set<std::string> recorded_images;
-  for (const SessionView& view : session_.views) recorded_images.insert(view.image);
-  for (const std::string& image : planned_) {
-    fs::remove(folder_ / (image + part_suffix), ignored);
-    if (!recorded_images.contains(image)) fs::remove(folder_ / image, ignored);
-  }
+  remove_unrecorded_images();
   return {};
+}
+
+void SessionRecorder::remove_leftovers() {
+  std::error_code ignored;
+  fs::remove(folder_ / SpaceReserve::file_name, ignored);
+  fs::remove(folder_ / (std::string("session.json") + part_suffix), ignored);
+  for (const std::string& image : planned_) fs::remove(folder_ / (image + part_suffix), ignored);
+  remove_unrecorded_images();
+}
+
+void SessionRecorder::remove_unrecorded_images() {
+  std::set<std::string> unrecorded = planned_;
+  for (const SessionView& view : session_.views) unrecorded.erase(view.image);
+  std::error_code ignored;
+  for (const std::string& image : unrecorded) fs::remove(folder_ / image, ignored);
 }
 
 Result<void> SessionRecorder::record(SessionView view, std::string_view image_bytes) {

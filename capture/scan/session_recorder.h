@@ -27,9 +27,11 @@ std::optional<std::string> plan_difference(const Session& recorded, const Sessio
 class SessionRecorder {
  public:
   /// Opens a new or an interrupted session and locks the folder against a second scan. `wanted`
-  /// is the session without views. Recorded views are verified; those that can't be kept are
-  /// forgotten (in memory: begin() makes it so on the disk). Errors (bad_input): the folder can't
-  /// be written to, holds something else, another scan's plan, or is locked; cancelled.
+  /// is the session without views. What an interrupted scan left is removed: its space reserve,
+  /// partly written files, and images of the plan that were never recorded. Recorded views are
+  /// verified; those that can't be kept are forgotten (in memory: begin() makes it so on the disk).
+  /// Errors (bad_input): the folder can't be written to, holds something else, another scan's plan,
+  /// or is locked; cancelled.
   static Result<SessionRecorder> open(const std::filesystem::path& folder, Session wanted,
                                       const ScanPlan& plan, WriteFile write_file,
                                       const Progress& progress);
@@ -52,8 +54,7 @@ class SessionRecorder {
   /// The camera's image size; an error if the session has another one.
   Result<void> set_image_size(const std::string& camera, int width, int height);
 
-  /// Writes session.json as it now is and removes what an interrupted scan left: partly written
-  /// files and images that are in the plan but were never recorded.
+  /// Writes session.json as it now is and removes the images of forgotten views.
   Result<void> begin();
 
   /// Writes the image, then the session with this view in it. `view.sha256` is filled in here.
@@ -65,6 +66,8 @@ class SessionRecorder {
 
   Result<void> keep_intact_views(const Progress& progress);
   Result<void> write_session_file();
+  void remove_leftovers();
+  void remove_unrecorded_images();
 
   std::filesystem::path folder_;
   Session session_;
