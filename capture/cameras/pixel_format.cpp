@@ -184,6 +184,16 @@ Image8 decode_rgb(const RawImageFormat& format, const std::uint8_t* bytes) {
   return image;
 }
 
+/// Sample `x` of a row of MIPI CSI-2 packed pixels: groups of 4 (10 bits) or 2 (12 bits), first
+/// their high bytes, then one byte with their low bits, those of the first pixel lowest.
+int packed_sample(const std::uint8_t* row, int x, int bits) {
+  const int group = bits == 10 ? 4 : 2;
+  const int low_bits = bits - 8;
+  const std::uint8_t* packed = row + std::ptrdiff_t{x / group} * (group + 1);
+  const int low = packed[group] >> (low_bits * (x % group)) & ((1 << low_bits) - 1);
+  return packed[x % group] << low_bits | low;
+}
+
 /// One channel of raw samples, unpacked; values above the format's maximum are clamped to it.
 Image16 unpack_samples(const RawImageFormat& format, const std::uint8_t* bytes) {
   const int bits = format.pixels.bits;
@@ -195,16 +205,11 @@ Image16 unpack_samples(const RawImageFormat& format, const std::uint8_t* bytes) 
     for (int x = 0; x < format.width; ++x) {
       if (bits == 8) {
         to[x] = from[x];
-      } else if (!format.pixels.packed) {
-        to[x] = static_cast<std::uint16_t>(std::min(from[2 * x] | from[2 * x + 1] << 8, maximum));
+      } else if (format.pixels.packed) {
+        to[x] = static_cast<std::uint16_t>(packed_sample(from, x, bits));
       } else {
-        // Groups of 4 (10 bits) or 2 (12 bits) pixels: their high bytes, then one byte of low bits.
-        const int group = bits == 10 ? 4 : 2;
-        const int low_bits = bits - 8;
-        const std::uint8_t* packed = from + std::ptrdiff_t{x / group} * (group + 1);
-        const int low = packed[group] >> (low_bits * (x % group));
-        to[x] = static_cast<std::uint16_t>(packed[x % group] << low_bits |
-                                           (low & ((1 << low_bits) - 1)));
+        const std::uint8_t* pair = from + std::ptrdiff_t{2} * x;
+        to[x] = static_cast<std::uint16_t>(std::min(pair[0] | pair[1] << 8, maximum));
       }
     }
   }

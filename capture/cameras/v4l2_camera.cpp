@@ -101,8 +101,7 @@ Result<void> V4l2Camera::open(const std::string& device_path) {
   }
   exposure_ = manual_exposure(*held);
   interval_ = FrameInterval(format->frame_interval);
-  open_ = std::make_unique<OpenCamera>(
-      OpenCamera{std::move(held), std::move(*format), std::move(*stream)});
+  open_ = std::make_unique<OpenCamera>(OpenCamera{std::move(held), *format, std::move(*stream)});
   settle();
   return {};
 }
