@@ -1,22 +1,15 @@
 #include "firmware_io/gpio_station.h"
 
 #include <fmt/format.h>
-#include <poll.h>
 #include <sys/eventfd.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <atomic>
 #include <cerrno>
-#include <condition_variable>
-#include <deque>
-#include <mutex>
 #include <set>
 #include <system_error>
-#include <thread>
 #include <utility>
 
+#include "firmware_io/gpio_panel.h"
 #include "firmware_io/real_time.h"
 #include "firmware_io/signal_player.h"
 #include "firmware_io/step_driver.h"
@@ -29,178 +22,10 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr auto chip_gone_text = "GPIO chip is gone";
-constexpr std::chrono::milliseconds longest_wait = std::chrono::hours{24 * 365};
-/// The levels are looked at this often even if no edge was told of (kernels before 6.6 don't wake
-/// a poll when a chip is removed, and a full edge queue drops edges).
-constexpr auto level_check_period = 250ms;
-
-/// The panel's inputs, the motor's enable line, and the thread that hears their edges.
-class Panel {
- public:
-  Panel(NamedLine estop, NamedLine door, NamedLine button, NamedLine enable,
-        const ButtonTiming& button_timing, Clock& clock, int wake_fd)
-      : estop_(std::move(estop)),
-        door_(std::move(door)),
-        button_(std::move(button)),
-        enable_(std::move(enable)),
-        clock_(clock),
-        wake_fd_(wake_fd),
-        detector_(button_timing),
-        latch_({[this] { return still_active(); }, [this] { cut_current(); }}) {
-    trip_if_active();
-    listener_ = std::jthread([this] { listen(); });
-  }
-
-  ~Panel() {
-    ::eventfd_write(wake_fd_, 1);
-    listener_.join();
-    ::close(wake_fd_);
-  }
-  Panel(const Panel&) = delete;
-  Panel& operator=(const Panel&) = delete;
-
-  TripLatch& latch() { return latch_; }
-
-  Result<void> enable(bool on) { return enable_.set(on); }
-
-  Result<std::optional<Press>> wait_for_press(std::chrono::milliseconds timeout,
-                                              std::stop_token stop) {
-    const Instant deadline = clock_.now() + std::min(timeout, longest_wait);
-    std::unique_lock lock(mutex_);
-    pressed_.wait_until(lock, stop, deadline, [&] { return !presses_.empty() || deaf_; });
-    if (!presses_.empty()) {
-      const Press press = presses_.front();
-      presses_.pop_front();
-      return press;
-    }
-    if (deaf_) return tl::unexpected(*deaf_);
-    return std::nullopt;
-  }
-
- private:
-  Result<std::string> still_active() {
-    for (auto [line, text] :
-         {std::pair{&estop_, "emergency stop pressed"}, std::pair{&door_, "door open"}}) {
-      const auto active = line->active();
-      if (!active) return forward(active);
-      if (*active) return text;
-    }
-    return "";
-  }
-
-  void cut_current() {
-    // If the line can't be reached, the turntable's next step fails with the reason.
-    static_cast<void>(enable_.set(false));
-  }
-
-  /// False if the lines can't be read any more.
-  bool trip_if_active() {
-    const auto active = still_active();
-    if (!active) {
-      go_deaf(active.error());
-    } else if (!active->empty()) {
-      latch_.trip(*active);
-    }
-    return active.has_value();
-  }
-
-  void go_deaf(Error error) {
-    {
-      const std::lock_guard lock(mutex_);
-      deaf_ = std::move(error);
-    }
-    pressed_.notify_all();
-    latch_.trip(chip_gone_text);
-  }
-
-  void listen() {
-    // Best effort: how stepping itself fares is in the turntable's diagnostics.
-    static_cast<void>(make_this_thread_real_time(interlock_priority));
-    const auto poll_for = [](int fd) { return pollfd{fd, POLLIN, 0}; };  // fd < 0 is passed over
-    std::array fds{poll_for(wake_fd_), poll_for(estop_.edge_fd()), poll_for(door_.edge_fd()),
-                   poll_for(button_.edge_fd())};
-    const auto& [woken, estop, door, button] = fds;
-    for (;;) {
-      const Instant before = clock_.now();
-      if (::poll(fds.data(), fds.size(), milliseconds_to_wait(before)) < 0 && errno != EINTR) {
-        return go_deaf({ErrorKind::hardware, "GPIO", std::system_category().message(errno), ""});
-      }
-      if (woken.revents != 0) return;
-      const bool hung_up = std::ranges::any_of(
-          fds, [](const pollfd& fd) { return (fd.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0; });
-      if (hung_up) {
-        return go_deaf({ErrorKind::hardware, "GPIO", chip_gone_text,
-                        "reconnect it, then start the station again"});
-      }
-      const bool heard = (estop.revents == 0 || hear_stop(estop_, "emergency stop pressed")) &&
-                         (door.revents == 0 || hear_stop(door_, "door open")) &&
-                         (button.revents == 0 || hear_button()) && trip_if_active();
-      if (!heard) return;
-      // With no edge queued, all that happened before the poll was heard.
-      if (button.revents == 0) tell_presses(before);
-    }
-  }
-
-  int milliseconds_to_wait(Instant now) const {
-    const Instant next =
-        std::min(detector_.next_decision().value_or(Instant::max()), now + level_check_period);
-    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next - now);
-    return static_cast<int>(std::max(0ms, wait).count());
-  }
-
-  /// Not debounced: the first edge counts.
-  bool hear_stop(NamedLine& line, const char* text) {
-    const auto edge = line.read_edge();
-    if (!edge) {
-      go_deaf(edge.error());
-    } else if (edge->active) {
-      latch_.trip(text);
-    }
-    return edge.has_value();
-  }
-
-  bool hear_button() {
-    const auto edge = button_.read_edge();
-    if (!edge) {
-      go_deaf(edge.error());
-    } else {
-      detector_.edge(edge->at, edge->active);
-    }
-    return edge.has_value();
-  }
-
-  void tell_presses(Instant until) {
-    const auto detected = detector_.advance(until);
-    if (detected.empty()) return;
-    {
-      const std::lock_guard lock(mutex_);
-      for (const auto& press : detected) presses_.push_back(press.press);
-    }
-    pressed_.notify_all();
-  }
-
-  NamedLine estop_;
-  NamedLine door_;
-  NamedLine button_;
-  NamedLine enable_;
-  Clock& clock_;
-  const int wake_fd_;
-  PressDetector detector_;  // the listener's own
-
-  std::mutex mutex_;
-  std::condition_variable_any pressed_;
-  std::deque<Press> presses_;
-  std::optional<Error> deaf_;  // why no edge will ever be heard again
-
-  TripLatch latch_;
-  std::jthread listener_;
-};
-
 class GpioStepDriver final : public StepDriver {
  public:
-  GpioStepDriver(std::shared_ptr<Panel> panel, NamedLine step, NamedLine direction, NamedLine home,
-                 std::chrono::microseconds pulse, bool reversed)
+  GpioStepDriver(std::shared_ptr<GpioPanel> panel, NamedLine step, NamedLine direction,
+                 NamedLine home, std::chrono::microseconds pulse, bool reversed)
       : panel_(std::move(panel)),
         step_(std::move(step)),
         direction_(std::move(direction)),
@@ -225,7 +50,7 @@ class GpioStepDriver final : public StepDriver {
   void wait_until(Instant deadline) override { sleep_exactly_until(deadline); }
 
  private:
-  std::shared_ptr<Panel> panel_;
+  std::shared_ptr<GpioPanel> panel_;
   NamedLine step_;
   NamedLine direction_;
   NamedLine home_;
@@ -235,14 +60,14 @@ class GpioStepDriver final : public StepDriver {
 
 class GpioButton final : public Button {
  public:
-  explicit GpioButton(std::shared_ptr<Panel> panel) : panel_(std::move(panel)) {}
+  explicit GpioButton(std::shared_ptr<GpioPanel> panel) : panel_(std::move(panel)) {}
   Result<std::optional<Press>> wait_for_press(std::chrono::milliseconds timeout,
                                               std::stop_token stop) override {
     return panel_->wait_for_press(timeout, stop);
   }
 
  private:
-  std::shared_ptr<Panel> panel_;
+  std::shared_ptr<GpioPanel> panel_;
 };
 
 class GpioLights final : public Lights {
@@ -358,8 +183,9 @@ Result<StationHardware> open_gpio_station(const GpioStationConfig& config,
   if (wake_fd < 0) {
     return fail(ErrorKind::hardware, "GPIO", std::system_category().message(errno));
   }
-  auto panel = std::make_shared<Panel>(std::move(estop), std::move(door), std::move(button),
-                                       std::move(enable), config.button_timing, clock, wake_fd);
+  auto panel = std::make_shared<GpioPanel>(
+      GpioPanelLines{std::move(estop), std::move(door), std::move(button), std::move(enable)},
+      config.button_timing, clock, wake_fd);
   const std::shared_ptr<TripLatch> latch(panel, &panel->latch());
   return StationHardware{
       std::make_unique<LatchedInterlock>(latch), std::make_unique<GpioButton>(panel),

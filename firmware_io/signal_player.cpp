@@ -77,7 +77,7 @@ std::optional<milliseconds> next_change(Signal signal, milliseconds shown_for) {
 }
 
 SignalPlayer::SignalPlayer(std::function<Result<void>(PanelState)> apply)
-    : apply_(std::move(apply)), player_([this](std::stop_token stop) { play(stop); }) {}
+    : apply_(std::move(apply)), player_([this](const std::stop_token& stop) { play(stop); }) {}
 
 SignalPlayer::~SignalPlayer() {
   player_.request_stop();
@@ -95,7 +95,7 @@ Result<void> SignalPlayer::show(Signal signal) {
   return now ? before : now;
 }
 
-void SignalPlayer::play(std::stop_token stop) {
+void SignalPlayer::play(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   auto playing = shown_at_;
   milliseconds applied{0};  // how far into the signal the lines are

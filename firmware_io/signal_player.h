@@ -40,7 +40,7 @@ class SignalPlayer final : public SignalLamp {
   Result<void> show(Signal signal) override;
 
  private:
-  void play(std::stop_token stop);
+  void play(const std::stop_token& stop);
 
   const std::function<Result<void>(PanelState)> apply_;
   std::mutex mutex_;

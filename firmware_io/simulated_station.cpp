@@ -94,7 +94,7 @@ struct SimulatedStation::World {
   }
 
   Result<std::optional<Press>> wait_for_press(std::chrono::milliseconds timeout,
-                                              std::stop_token stop) {
+                                              const std::stop_token& stop) {
     const Instant deadline = clock.now() + std::min(timeout, longest_wait);
     for (;;) {
       std::stop_source wake;
@@ -158,9 +158,9 @@ class SimulatedStation::World::Motor final : public StepDriver {
     world_.enable(on);
     return {};
   }
-  Result<void> set_direction(int direction) override {
+  Result<void> set_direction(int new_direction) override {
     const std::lock_guard lock(world_.mutex);
-    world_.direction = direction;
+    world_.direction = new_direction;
     return {};
   }
   Result<void> step() override {
@@ -198,15 +198,15 @@ class SimulatedStation::World::Lamp final : public SignalLamp {
   Lamp(const Lamp&) = delete;
   Lamp& operator=(const Lamp&) = delete;
 
-  Result<void> show(Signal signal) override {
-    set(signal);
+  Result<void> show(Signal shown) override {
+    set(shown);
     return {};
   }
 
  private:
-  void set(Signal signal) {
+  void set(Signal shown) {
     const std::lock_guard lock(world_.mutex);
-    world_.signal = signal;
+    world_.signal = shown;
   }
 
   World& world_;

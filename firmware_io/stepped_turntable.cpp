@@ -88,7 +88,7 @@ SteppingDiagnostics SteppedTurntable::diagnostics() const {
 
 /// Finds the switch's edge fast, backs off, finds the same edge again slowly and counter-clockwise,
 /// as every later approach will be.
-Result<void> SteppedTurntable::find_zero(std::stop_token stop) {
+Result<void> SteppedTurntable::find_zero(const std::stop_token& stop) {
   const double speed_deg_s = config_.home_speed_deg_s;
   const long search = steps_in(config_.home_search_deg);
   const long clearance = steps_in(config_.backlash_deg + index_hysteresis_deg);
@@ -121,7 +121,7 @@ Result<void> SteppedTurntable::find_zero(std::stop_token stop) {
 }
 
 /// Ends at `position` counter-clockwise, with the gear's play taken up.
-Result<void> SteppedTurntable::approach(long position, std::stop_token stop) {
+Result<void> SteppedTurntable::approach(long position, const std::stop_token& stop) {
   if (position - position_ < slack_) {
     const long before = position - steps_in(config_.backlash_deg);
     if (auto turned = turn_by(before - position_, stop); !turned) return turned;
@@ -129,7 +129,7 @@ Result<void> SteppedTurntable::approach(long position, std::stop_token stop) {
   return turn_by(position - position_, stop);
 }
 
-Result<void> SteppedTurntable::turn_by(long steps, std::stop_token stop) {
+Result<void> SteppedTurntable::turn_by(long steps, const std::stop_token& stop) {
   const auto turned = travel({steps, config_.limits, std::nullopt}, stop);
   if (!turned) return forward(turned);
   return {};
@@ -137,7 +137,7 @@ Result<void> SteppedTurntable::turn_by(long steps, std::stop_token stop) {
 
 Result<SteppedTurntable::Sighting> SteppedTurntable::seek_index(bool closed, long steps,
                                                                 double speed_deg_s,
-                                                                std::stop_token stop) {
+                                                                const std::stop_token& stop) {
   const auto now_closed = driver_->index_closed();
   if (!now_closed) return forward(now_closed);
   if (*now_closed == closed) return position_.load();
@@ -147,7 +147,7 @@ Result<SteppedTurntable::Sighting> SteppedTurntable::seek_index(bool closed, lon
 }
 
 Result<SteppedTurntable::Sighting> SteppedTurntable::travel(const Travel& travel,
-                                                            std::stop_token stop) {
+                                                            const std::stop_token& stop) {
   if (stop.stop_requested()) return cancelled();
   if (travel.steps == 0) return Sighting{};
   MotionPlan plan = plan_motion(travel.steps, travel.limits);
@@ -170,7 +170,7 @@ Result<SteppedTurntable::Sighting> SteppedTurntable::travel(const Travel& travel
 
 Result<SteppedTurntable::Sighting> SteppedTurntable::make_steps(const Travel& travel,
                                                                 MotionPlan plan,
-                                                                std::stop_token stop) {
+                                                                const std::stop_token& stop) {
   if (auto set = driver_->set_direction(plan.direction); !set) return forward(set);
   Sighting sighting;
   bool braking = false;

@@ -40,12 +40,13 @@ class SteppedTurntable final : public Turntable {
   /// The position at which the index switch first had the level looked for, if it had.
   using Sighting = std::optional<long>;
 
-  Result<void> find_zero(std::stop_token stop);
-  Result<void> approach(long position, std::stop_token stop);
-  Result<void> turn_by(long steps, std::stop_token stop);
-  Result<Sighting> seek_index(bool closed, long steps, double speed_deg_s, std::stop_token stop);
-  Result<Sighting> travel(const Travel& travel, std::stop_token stop);
-  Result<Sighting> make_steps(const Travel& travel, MotionPlan plan, std::stop_token stop);
+  Result<void> find_zero(const std::stop_token& stop);
+  Result<void> approach(long position, const std::stop_token& stop);
+  Result<void> turn_by(long steps, const std::stop_token& stop);
+  Result<Sighting> seek_index(bool closed, long steps, double speed_deg_s,
+                              const std::stop_token& stop);
+  Result<Sighting> travel(const Travel& travel, const std::stop_token& stop);
+  Result<Sighting> make_steps(const Travel& travel, MotionPlan plan, const std::stop_token& stop);
 
   Result<void> switch_current_on();
   void switch_current_off();

@@ -5,7 +5,8 @@
 namespace skullstation {
 
 TripLatch::TripLatch(Backend backend)
-    : backend_(std::move(backend)), notifier_([this](std::stop_token stop) { notify(stop); }) {}
+    : backend_(std::move(backend)),
+      notifier_([this](const std::stop_token& stop) { notify(stop); }) {}
 
 TripLatch::~TripLatch() = default;
 
@@ -46,7 +47,7 @@ void TripLatch::on_trip(std::function<void()> callback) {
   trips_before_callback_ = trips_;
 }
 
-void TripLatch::notify(std::stop_token stop) {
+void TripLatch::notify(const std::stop_token& stop) {
   for (long trip = 1;; ++trip) {
     {
       std::unique_lock lock(mutex_);

@@ -40,7 +40,7 @@ class TripLatch {
   void on_trip(std::function<void()> callback);
 
  private:
-  void notify(std::stop_token stop);
+  void notify(const std::stop_token& stop);
 
   const Backend backend_;
   std::atomic<bool> tripped_{false};
