@@ -22,7 +22,7 @@ constexpr double flag_width_deg = 6.0;
 GpioStationConfig wiring(bool bounces) {
   GpioStationConfig config = gpio_sim_wiring();
   // Long beside the gaps between edges, even on a busy machine; shorter than any press.
-  config.button_timing.debounce = bounces ? 250ms : 60ms;
+  config.button_timing.debounce = bounces ? 200ms : 60ms;
   return config;
 }
 
@@ -49,7 +49,7 @@ std::unique_ptr<GpioSim> make_gpio_sim_station(const std::string& name) {
 }
 
 GpioSimWorld::GpioSimWorld(const contract::WorldOptions& options)
-    : bounces_(options.button_bounces), turntable_(options.turntable) {
+    : bounces_(options.button_bounces), turntable_(contract::hurried(options.turntable)) {
   const GpioStationConfig wires = wiring(bounces_);
   GpioLines::Chips chips;
   chips.push_back(open_watched_chip(chip_->device_path(), wires.step.name, [this] { step(); }));

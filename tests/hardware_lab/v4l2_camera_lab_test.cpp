@@ -1,4 +1,5 @@
-// The V4L2 backend against the kernel's own virtual camera, vivid.
+// The V4L2 backend against the kernel's own virtual camera, vivid: what the contract of all cameras
+// leaves open.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +20,7 @@ using std::chrono::milliseconds;
 using testing::HasSubstr;
 
 // Generous: under emulation on a busy machine a frame may take its time.
-constexpr milliseconds patience{20'000};
+constexpr milliseconds patience{60'000};
 
 class V4l2CameraLab : public testing::Test {
  protected:
@@ -64,30 +65,6 @@ TEST_F(V4l2CameraLab, IsListedWithItsStablePathAndFormats) {
   EXPECT_THAT(to_string(cameras[0].formats), HasSubstr("NV12 320x180 640x360"));
 }
 
-TEST_F(V4l2CameraLab, FramesAreFreshAndInOrder) {
-  const auto camera = opened();
-  std::uint32_t last = 0;
-  for (int i = 0; i < 5; ++i) {
-    const Instant asked = clock_.now();
-    const auto frame = camera->frame_after(asked, patience, {});
-    ASSERT_TRUE(frame) << frame.error().message();
-    EXPECT_GE(frame->exposure_start, asked);
-    EXPECT_LE(frame->exposure_start, clock_.now());
-    EXPECT_GT(frame->sequence, last);
-    last = frame->sequence;
-  }
-}
-
-TEST_F(V4l2CameraLab, AStopRequestEndsTheWait) {
-  const auto camera = opened();
-  vivid_.drop_frames(100);
-  std::stop_source stop;
-  const std::jthread operator_thread([&] { stop.request_stop(); });
-  const auto frame = camera->frame_after(clock_.now(), std::chrono::hours(1), stop.get_token());
-  ASSERT_FALSE(frame);
-  EXPECT_EQ(frame.error().kind, ErrorKind::cancelled);
-}
-
 TEST_F(V4l2CameraLab, GainIsLockedReadBackAndKeptByReopening) {
   const auto camera = opened();
   EXPECT_EQ(value_of(*camera, "gain_automatic"), 1);
@@ -109,17 +86,6 @@ TEST_F(V4l2CameraLab, GainIsLockedReadBackAndKeptByReopening) {
   ASSERT_TRUE(reopened) << reopened.error().message();
   EXPECT_EQ(value_of(*camera, "gain_automatic"), 0);
   EXPECT_EQ(value_of(*camera, "gain"), 0);
-}
-
-TEST_F(V4l2CameraLab, ASettingThatItLacksIsNamed) {
-  const auto camera = opened();
-  CameraSettings only_focus;
-  only_focus.focus = 0.5;
-  const auto focus = camera->lock(only_focus);
-  ASSERT_FALSE(focus);
-  EXPECT_EQ(focus.error().kind, ErrorKind::bad_input);
-  EXPECT_THAT(focus.error().message(), HasSubstr("focus"));
-  EXPECT_TRUE(fresh_frame(*camera));  // and the stream goes on
 }
 
 TEST_F(V4l2CameraLab, DamagedBuffersNeverReachTheCaller) {
@@ -266,13 +232,25 @@ constexpr int bar_level = 191;
 constexpr int bars[8][3] = {{1, 1, 1}, {1, 1, 0}, {0, 1, 1}, {0, 1, 0},
                             {1, 0, 1}, {1, 0, 0}, {0, 0, 1}, {0, 0, 0}};
 
-class V4l2FormatLab : public V4l2CameraLab, public testing::WithParamInterface<const char*> {};
+class V4l2FormatLab : public testing::TestWithParam<const char*> {
+ protected:
+  // One device for all formats: opening it sets everything that they need.
+  static void SetUpTestSuite() { VividDevice().show_colour_bars(); }
+
+  SystemClock clock_;
+};
 
 TEST_P(V4l2FormatLab, ColourBarsComeOutRight) {
-  config_.format.format = GetParam();
-  const auto camera = opened();
-  EXPECT_THAT(camera->description().format, HasSubstr("640x360"));
-  const auto frame = fresh_frame(*camera);
+  V4l2CameraConfig config;
+  config.device = VividDevice::stable_path();
+  config.format.size = FrameSize{640, 360};
+  config.format.format = GetParam();
+  config.format.frames_per_second = 30.0;
+  config.settle_frames = 0;
+  const auto camera = open_v4l2_camera(config);
+  ASSERT_TRUE(camera) << camera.error().message();
+  EXPECT_THAT((*camera)->description().format, HasSubstr("640x360"));
+  const auto frame = (*camera)->frame_after(clock_.now(), patience, {});
   ASSERT_TRUE(frame) << frame.error().message();
   ASSERT_EQ(frame->image.width, 640);
   ASSERT_EQ(frame->image.height, 360);

@@ -6,9 +6,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
+#include <chrono>
 #include <filesystem>
 #include <system_error>
+#include <thread>
 
 #include "tests/hardware_lab/kernel_file.h"
 
@@ -27,9 +28,14 @@ constexpr std::uint32_t buffer_error = vivid_controls + 66;
 constexpr std::uint32_t stream_start_error = vivid_controls + 69;
 constexpr std::uint32_t fatal_stream_error = vivid_controls + 70;
 
-void wait_for_udev() {
-  if (std::system("udevadm settle --timeout=30") != 0) {
-    throw std::system_error(std::make_error_code(std::errc::timed_out), "udevadm settle");
+/// udev makes the link last when a camera comes and takes it away when the camera is gone.
+void wait_for_link(bool there) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (std::filesystem::exists(VividDevice::stable_path()) != there) {
+    if (std::chrono::steady_clock::now() > deadline) {
+      throw std::system_error(std::make_error_code(std::errc::timed_out), "udev");
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
 }
 
@@ -46,12 +52,12 @@ std::string VividDevice::node() { return std::filesystem::canonical(stable_path(
 
 void VividDevice::unplug() {
   write_kernel_file(driver / "unbind", device);
-  wait_for_udev();
+  wait_for_link(false);
 }
 
 void VividDevice::plug() {
   write_kernel_file(driver / "bind", device);
-  wait_for_udev();
+  wait_for_link(true);
 }
 
 void VividDevice::set_control(std::uint32_t id, std::int32_t value) {
