@@ -79,9 +79,8 @@ float BoneTexture::pore_depth(const Vector3f& x, float footprint_mm) const {
   // One pore at most in a cell, wholly inside it, so that a point looks at its own cell only.
   constexpr float cell_mm = 1.3F;
   const Vector3f scaled = x / cell_mm;
-  const Vector3f floor_of(std::floor(scaled.x()), std::floor(scaled.y()), std::floor(scaled.z()));
-  const std::uint32_t h = cell_hash(static_cast<int>(floor_of.x()), static_cast<int>(floor_of.y()),
-                                    static_cast<int>(floor_of.z()), seed_ + 201);
+  const Eigen::Vector3i cell(cell_of(scaled.x()), cell_of(scaled.y()), cell_of(scaled.z()));
+  const std::uint32_t h = cell_hash(cell.x(), cell.y(), cell.z(), seed_ + 201);
   const std::uint32_t where = cell_hash(static_cast<int>(h & 0xffffU), 0, 0, seed_ + 202);
   const auto unit = [](std::uint32_t bits) { return static_cast<float>(bits & 0x3ffU) / 1023.0F; };
   const float radius_mm = 0.08F + 0.17F * unit(h >> 2) * unit(h >> 12);
@@ -89,7 +88,7 @@ float BoneTexture::pore_depth(const Vector3f& x, float footprint_mm) const {
   const Vector3f centre =
       Vector3f::Constant(margin) +
       (1.0F - 2.0F * margin) * Vector3f(unit(where), unit(where >> 10), unit(where >> 20));
-  const float distance = cell_mm * (scaled - floor_of - centre).norm();
+  const float distance = cell_mm * (scaled - cell.cast<float>() - centre).norm();
   return unit(h >> 22) * line_cover(distance, radius_mm, footprint_mm);
 }
 

@@ -59,4 +59,10 @@ Eigen::Vector2d PreparedOptics::ray(double x_px, double y_px) const {
          v * ((1.0 - u) * corner[stride] + u * corner[stride + 1]);
 }
 
+std::pair<Eigen::Vector2d, Eigen::Vector2d> PreparedOptics::pixel_size(int x, int y) const {
+  const int stride = optics_.lens.width + 1;
+  const Eigen::Vector2d* corner = corner_rays_.data() + static_cast<std::size_t>(y) * stride + x;
+  return {corner[1] - corner[0], corner[stride] - corner[0]};
+}
+
 }  // namespace skullstation

@@ -14,6 +14,23 @@
 
 namespace skullstation {
 
+/// The room's cloth: a cylinder around the axis, dark, lit from above, with folds. It stands still
+/// in the station frame. A picture of it, bilinear between its points.
+class Backdrop {
+ public:
+  Backdrop();
+  static constexpr double radius_mm = 1400.0;
+  /// Radiance at a point of the cylinder.
+  Eigen::Vector3f radiance(const Eigen::Vector3d& x_station) const;
+
+ private:
+  static constexpr int around = 880;
+  static constexpr int rows = 260;
+  static constexpr double lowest_mm = -1300.0;
+  static constexpr double row_mm = 10.0;
+  std::vector<float> light_;  // rows x (around + 1), upwards; the last column repeats the first
+};
+
 /// What of the scene never changes.
 struct SceneParts {
   SceneOptions options;
@@ -21,6 +38,7 @@ struct SceneParts {
   BoneTexture bone;
   std::optional<BoardPrint> print;
   SampleTable samples;
+  Backdrop backdrop;
 };
 
 /// Light from everywhere but the lamps, in the unit of radiance that a white surface would send
@@ -33,8 +51,8 @@ struct Ambient {
 /// How much of the sky the specimen leaves to the points of the table's top: a square grid in the
 /// table frame, bilinear between its points, 1 outside.
 struct TableSky {
-  static constexpr int size = 241;
-  static constexpr double spacing_mm = 2.5;
+  static constexpr int size = 141;
+  static constexpr double spacing_mm = 4.0;
   std::vector<float> open;  ///< size x size, row-major, y upwards; empty: no specimen
 
   float at(double x_table, double y_table) const;
@@ -44,6 +62,7 @@ struct TableSky {
 struct PlacedScene {
   std::shared_ptr<const SceneParts> parts;
   Rigid3 table_from_board;
+  Eigen::Matrix3d board_rotation_table;  ///< as a matrix: every ray of sight needs it
   std::optional<Rigid3> table_from_specimen;
   std::vector<Ambient> vertex_ambient;  ///< per vertex of the shading mesh; empty: no specimen
   TableSky table_sky;

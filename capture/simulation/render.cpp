@@ -21,25 +21,26 @@ constexpr int tile_px = 32;
 /// The samples of a pixel so far.
 struct PixelSum {
   Vector3f radiance = Vector3f::Zero();
-  float darkest = std::numeric_limits<float>::infinity();
-  float brightest = 0.0F;
+  float least_light = std::numeric_limits<float>::infinity();
+  float most_light = 0.0F;
   std::uint8_t objects = 0;  ///< one bit for each SceneObject
+  std::uint8_t lamps_seen = 0;
+  std::uint8_t lamps_hidden = 0;
   std::uint8_t count = 0;
 
   void add(const TracedSample& sample) {
-    const float luminance = 0.2126F * sample.radiance.x() + 0.7152F * sample.radiance.y() +
-                            0.0722F * sample.radiance.z();
     radiance += sample.radiance;
-    darkest = std::min(darkest, luminance);
-    brightest = std::max(brightest, luminance);
+    least_light = std::min(least_light, sample.light);
+    most_light = std::max(most_light, sample.light);
     objects |= static_cast<std::uint8_t>(1U << static_cast<unsigned>(sample.object));
+    lamps_seen |= sample.lamps_seen;
+    lamps_hidden |= sample.lamps_hidden;
     ++count;
   }
-  /// The offset keeps the noise of dark places from counting.
+  /// An outline, the edge of a shadow or a sharp turn of the surface runs through it.
   bool uneven(float contrast) const {
-    constexpr float dark = 0.02F;
-    return (objects & (objects - 1)) != 0 ||
-           brightest - darkest > contrast * (brightest + darkest + dark);
+    return (objects & (objects - 1)) != 0 || (lamps_seen & lamps_hidden) != 0 ||
+           most_light - least_light > contrast * (most_light + least_light);
   }
 };
 
@@ -77,7 +78,7 @@ Result<void> RenderOptions::validate() const {
     return bad("samples_where_uneven",
                fmt::format("must be at least samples and at most {}", SampleTable::points));
   }
-  if (!(uneven_contrast >= 0.0)) return bad("uneven_contrast", "must not be negative");
+  if (!(uneven_light >= 0.0)) return bad("uneven_light", "must not be negative");
   return {};
 }
 
@@ -113,7 +114,7 @@ ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics
   // have missed an edge. Deciding by the neighbours, too, keeps edges where they are.
   std::vector<char> uneven(sums.size());
   std::transform(sums.begin(), sums.end(), uneven.begin(), [&](const PixelSum& sum) {
-    return sum.uneven(static_cast<float>(options.uneven_contrast)) ? 1 : 0;
+    return sum.uneven(static_cast<float>(options.uneven_light)) ? 1 : 0;
   });
   const auto near_uneven = [&](int x, int y) {
     for (int j = std::max(0, y - 1); j <= std::min(lens.height - 1, y + 1); ++j) {
@@ -144,7 +145,7 @@ ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics
       const PixelSum& sum = sum_of(x, y);
       const float factor = vignette(optics, x, y) / static_cast<float>(sum.count);
       for (int channel = 0; channel < 3; ++channel) {
-        image.at(x, y, channel) = factor * sum.radiance[channel];
+        image.at(x, y, channel) = std::max(0.0F, factor * sum.radiance[channel]);
       }
     }
   });

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "capture/simulation/scene.h"
@@ -38,16 +39,21 @@ class PreparedOptics {
   /// within 1e-3 px of Lens::ray for lenses of practical use.
   Eigen::Vector2d ray(double x_px, double y_px) const;
 
+  /// How (x, y) of the ray changes over the width and over the height of a pixel.
+  std::pair<Eigen::Vector2d, Eigen::Vector2d> pixel_size(int x, int y) const;
+
  private:
   CameraOptics optics_;
   std::vector<Eigen::Vector2d> corner_rays_;  // (width + 1) x (height + 1), row-major
 };
 
 struct RenderOptions {
-  int samples = 4;                ///< per pixel, everywhere
-  int samples_where_uneven = 16;  ///< per pixel at and beside edges, shadows and fine texture
-  double uneven_contrast = 0.12;  ///< of the samples of a pixel, (max - min) / (max + min)
-  std::uint64_t seed = 1;         ///< of the sampling pattern; change it for every frame
+  int samples = 4;  ///< per pixel, everywhere; textures are filtered to match
+  /// Per pixel at and beside outlines, the edges of shadows and sharp turns of the surface.
+  int samples_where_uneven = 16;
+  /// What counts as a sharp turn: (max - min) / (max + min) of the light on the surface.
+  double uneven_light = 0.2;
+  std::uint64_t seed = 1;  ///< of the sampling pattern; change it for every frame
   int threads = 0;
 
   Result<void> validate() const;

@@ -1,5 +1,8 @@
 #include "capture/simulation/sample_table.h"
 
+#include <cmath>
+#include <numbers>
+
 #include "core/random.h"
 
 namespace skullstation {
@@ -38,10 +41,22 @@ std::uint32_t sobol_second(std::uint32_t index) {
 /// In [0, 1): the 24 bits that a float holds.
 float unit_float(std::uint32_t x) { return static_cast<float>(x >> 8) * 0x1.0p-24F; }
 
+Eigen::Vector2f to_disc(const Eigen::Vector2f& square) {
+  const float a = 2.0F * square.x() - 1.0F;
+  const float b = 2.0F * square.y() - 1.0F;
+  if (a == 0.0F && b == 0.0F) return Eigen::Vector2f::Zero();
+  constexpr float eighth = std::numbers::pi_v<float> / 4.0F;
+  const bool wide = std::abs(a) > std::abs(b);
+  const float radius = wide ? a : b;
+  const float turn = wide ? eighth * (b / a) : eighth * (2.0F - a / b);
+  return {radius * std::cos(turn), radius * std::sin(turn)};
+}
+
 }  // namespace
 
 SampleTable::SampleTable(std::uint64_t seed) {
   table_.reserve(sets * points);
+  discs_.reserve(sets * points);
   for (std::uint64_t set = 0; set < sets; ++set) {
     const std::uint64_t hash = mix(seed, set);
     const auto x_seed = static_cast<std::uint32_t>(hash);
@@ -49,6 +64,7 @@ SampleTable::SampleTable(std::uint64_t seed) {
     for (std::uint32_t index = 0; index < points; ++index) {
       table_.emplace_back(unit_float(owen_scramble(reverse_bits(index), x_seed)),
                           unit_float(owen_scramble(sobol_second(index), y_seed)));
+      discs_.push_back(to_disc(table_.back()));
     }
   }
 }

@@ -23,9 +23,15 @@ class SampleTable {
     return table_[(set_hash % sets) * points + static_cast<std::uint64_t>(index)];
   }
 
+  /// The same point brought to the unit disc without bunching (Shirley & Chiu 1997).
+  const Eigen::Vector2f& in_disc(std::uint64_t set_hash, int index) const {
+    return discs_[(set_hash % sets) * points + static_cast<std::uint64_t>(index)];
+  }
+
  private:
   static constexpr std::uint64_t sets = 256;
   std::vector<Eigen::Vector2f> table_;
+  std::vector<Eigen::Vector2f> discs_;
 };
 
 }  // namespace skullstation

@@ -19,6 +19,11 @@ tl::unexpected<Error> bad_option(const char* option, const std::string& what) {
   return fail(ErrorKind::bad_input, fmt::format("simulated scene, {}", option), what);
 }
 
+void put_board(PlacedScene& scene, const Rigid3& table_from_board) {
+  scene.table_from_board = table_from_board;
+  scene.board_rotation_table = table_from_board.rotation.conjugate().toRotationMatrix();
+}
+
 }  // namespace
 
 std::vector<SoftBox> SceneOptions::default_lights() {
@@ -40,6 +45,7 @@ Result<void> SceneOptions::validate() const {
   if (ambient_rays < 1 || ambient_rays > SampleTable::points) {
     return bad_option("ambient_rays", fmt::format("must be 1 to {}", SampleTable::points));
   }
+  if (lights.size() > 8) return bad_option("lights", "must be 8 at most");
   for (const SoftBox& light : lights) {
     if (!(light.width_mm > 0.0 && light.height_mm > 0.0 && light.strength >= 0.0) ||
         !((light.centre_mm - light.target_mm).norm() > 0.0)) {
@@ -77,8 +83,8 @@ Result<std::shared_ptr<SimulatedScene>> SimulatedScene::build(const TriangleMesh
   auto placed = std::make_shared<PlacedScene>();
   placed->parts = std::make_shared<const SceneParts>(
       SceneParts{options, std::move(surface), BoneTexture(options.bone, bounding_box(specimen)),
-                 std::move(print), SampleTable(options.bone.seed)});
-  placed->table_from_board = options.table_from_board;
+                 std::move(print), SampleTable(options.bone.seed), Backdrop()});
+  put_board(*placed, options.table_from_board);
   if (!bare) placed->table_from_specimen = table_from_specimen;
   compute_ambient(*placed, threads);
 
@@ -95,14 +101,14 @@ void SimulatedScene::set_specimen_pose(const std::optional<Rigid3>& table_from_s
   compute_ambient(*changed, state_->threads);
   const std::lock_guard lock(state_->mutex);
   // Whoever moved the board in the meantime is not to be undone.
-  changed->table_from_board = state_->placed->table_from_board;
+  put_board(*changed, state_->placed->table_from_board);
   state_->placed = std::move(changed);
 }
 
 void SimulatedScene::set_board_pose(const Rigid3& table_from_board) {
   const std::lock_guard lock(state_->mutex);
   auto changed = std::make_shared<PlacedScene>(*state_->placed);
-  changed->table_from_board = table_from_board;
+  put_board(*changed, table_from_board);
   state_->placed = std::move(changed);
 }
 

@@ -48,11 +48,11 @@ struct SceneOptions {
   bool platter = true;               ///< false: nothing under the board (it is held in the hand)
   double platter_radius_mm = 265.0;  ///< its top lies under the board's plate
   double platter_thickness_mm = 15.0;
-  std::vector<SoftBox> lights = default_lights();
+  std::vector<SoftBox> lights = default_lights();  ///< 8 at most
   double ambient = 0.22;  ///< radiance of the zenith; falls to a third of it at the horizon
   BoneLook bone;
   double gloss = 0.04;    ///< strength of the bone's highlight; 0: purely diffuse
-  int ambient_rays = 64;  ///< per mesh vertex, for the ambient light's occlusion
+  int ambient_rays = 32;  ///< per mesh vertex, for the ambient light's occlusion
 
   Result<void> validate() const;
   /// A key light and a weaker fill on either side of a camera at azimuth -90 deg.

@@ -33,7 +33,7 @@ class ResponseCurve {
   }
   std::uint8_t operator()(float light) const {
     const float at = std::clamp(light, 0.0F, 1.0F) * static_cast<float>(steps);
-    return codes_[static_cast<std::size_t>(std::lround(at))];
+    return codes_[static_cast<std::size_t>(at + 0.5F)];
   }
 
  private:

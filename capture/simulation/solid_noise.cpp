@@ -1,14 +1,16 @@
 #include "capture/simulation/solid_noise.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace skullstation {
 
-std::uint32_t cell_hash(int x, int y, int z, std::uint32_t seed) {
-  std::uint32_t h = seed ^ (static_cast<std::uint32_t>(x) * 0x8da6b343U) ^
-                    (static_cast<std::uint32_t>(y) * 0xd8163841U) ^
-                    (static_cast<std::uint32_t>(z) * 0xcb1ab31fU);
+namespace {
+
+constexpr std::uint32_t x_factor = 0x8da6b343U;
+constexpr std::uint32_t y_factor = 0xd8163841U;
+constexpr std::uint32_t z_factor = 0xcb1ab31fU;
+
+std::uint32_t scatter(std::uint32_t h) {
   h ^= h >> 16;
   h *= 0x7feb352dU;
   h ^= h >> 15;
@@ -16,14 +18,12 @@ std::uint32_t cell_hash(int x, int y, int z, std::uint32_t seed) {
   return h ^ (h >> 16);
 }
 
-namespace {
-
 /// Dot product of (x, y, z) with a gradient that the hash picks, its components in [-1, 1).
 float gradient_dot(std::uint32_t h, float x, float y, float z) {
   const auto component = [&](int shift) {
-    return static_cast<float>(static_cast<std::int32_t>((h >> shift) & 0x3ffU) - 512) / 512.0F;
+    return static_cast<float>(static_cast<std::int32_t>((h >> shift) & 0x3ffU) - 512);
   };
-  return component(0) * x + component(10) * y + component(20) * z;
+  return (component(0) * x + component(10) * y + component(20) * z) * (1.0F / 512.0F);
 }
 
 float fade(float t) { return t * t * t * (t * (t * 6.0F - 15.0F) + 10.0F); }
@@ -31,24 +31,35 @@ float blend(float a, float b, float t) { return a + t * (b - a); }
 
 }  // namespace
 
+std::uint32_t cell_hash(int x, int y, int z, std::uint32_t seed) {
+  return scatter(seed ^ (static_cast<std::uint32_t>(x) * x_factor) ^
+                 (static_cast<std::uint32_t>(y) * y_factor) ^
+                 (static_cast<std::uint32_t>(z) * z_factor));
+}
+
+int cell_of(float x) {
+  const int toward_zero = static_cast<int>(x);
+  return toward_zero - (static_cast<float>(toward_zero) > x ? 1 : 0);
+}
+
 float gradient_noise(const Eigen::Vector3f& x, std::uint32_t seed) {
-  const float fx = std::floor(x.x());
-  const float fy = std::floor(x.y());
-  const float fz = std::floor(x.z());
-  const int ix = static_cast<int>(fx);
-  const int iy = static_cast<int>(fy);
-  const int iz = static_cast<int>(fz);
-  const float dx = x.x() - fx;
-  const float dy = x.y() - fy;
-  const float dz = x.z() - fz;
+  const int ix = cell_of(x.x());
+  const int iy = cell_of(x.y());
+  const int iz = cell_of(x.z());
+  const float dx = x.x() - static_cast<float>(ix);
+  const float dy = x.y() - static_cast<float>(iy);
+  const float dz = x.z() - static_cast<float>(iz);
+  const std::uint32_t hx = static_cast<std::uint32_t>(ix) * x_factor;
+  const std::uint32_t hy = static_cast<std::uint32_t>(iy) * y_factor;
+  const std::uint32_t hz = static_cast<std::uint32_t>(iz) * z_factor;
+  const std::uint32_t x_terms[2] = {seed ^ hx, seed ^ (hx + x_factor)};
+  const std::uint32_t yz_terms[4] = {hy ^ hz, (hy + y_factor) ^ hz, hy ^ (hz + z_factor),
+                                     (hy + y_factor) ^ (hz + z_factor)};
   float corner[8];
   for (int c = 0; c < 8; ++c) {
-    const int cx = c & 1;
-    const int cy = (c >> 1) & 1;
-    const int cz = c >> 2;
     corner[c] =
-        gradient_dot(cell_hash(ix + cx, iy + cy, iz + cz, seed), dx - static_cast<float>(cx),
-                     dy - static_cast<float>(cy), dz - static_cast<float>(cz));
+        gradient_dot(scatter(x_terms[c & 1] ^ yz_terms[c >> 1]), dx - static_cast<float>(c & 1),
+                     dy - static_cast<float>((c >> 1) & 1), dz - static_cast<float>(c >> 2));
   }
   const float u = fade(dx);
   const float v = fade(dy);

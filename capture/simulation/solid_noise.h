@@ -9,6 +9,9 @@ namespace skullstation {
 /// 1.5, with mean 0 and values in [-1, 1]; standard deviation about 0.25.
 float gradient_noise(const Eigen::Vector3f& x, std::uint32_t seed);
 
+/// The lattice cell that x lies in: the largest integer not above it. \pre it fits an int
+int cell_of(float x);
+
 /// A hash of a lattice cell.
 std::uint32_t cell_hash(int x, int y, int z, std::uint32_t seed);
 

@@ -190,7 +190,7 @@ void SpecimenSurface::occluded(std::span<const SpecimenRay> rays,
   std::array<std::size_t, batch> owners;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
 
   const auto trace = [&](std::size_t count) {
     rtcOccluded1M(embree_->scene, &context, queries.data(), static_cast<unsigned>(count),

@@ -13,7 +13,6 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr double backdrop_radius_mm = 1400.0;
 constexpr double shadow_offset_mm = 0.03;
 constexpr float paper_albedo = 0.82F;
 constexpr float ink_albedo = 0.035F;
@@ -56,6 +55,10 @@ Eigen::Vector2d half_plate(const SceneOptions& options) {
           0.5 * options.board->height_mm() + options.board_border_mm};
 }
 
+Vector3d to_board(const PlacedScene& scene, const Vector3d& x_table) {
+  return scene.board_rotation_table * (x_table - scene.table_from_board.translation);
+}
+
 void hit_board(const PlacedScene& scene, const SightRay& ray, SurfacePoint& nearest) {
   const SceneOptions& options = scene.parts->options;
   const Eigen::Vector2d half = half_plate(options);
@@ -69,7 +72,7 @@ void hit_board(const PlacedScene& scene, const SightRay& ray, SurfacePoint& near
   normal[hit->axis] = direction[hit->axis] < 0.0 ? 1.0 : -1.0;
   nearest.object = SceneObject::board;
   nearest.distance_mm = hit->distance_mm;
-  nearest.flat_normal = scene.table_from_board.rotation * normal;
+  nearest.flat_normal = scene.board_rotation_table.transpose() * normal;
 }
 
 /// A cylinder around the axis; its top is seen from above, its side from everywhere.
@@ -103,8 +106,8 @@ void hit_platter(const SceneOptions& options, const SightRay& ray, SurfacePoint&
   nearest.flat_normal = Vector3d(x.x(), x.y(), 0.0).normalized();
 }
 
-/// A cloth around the room, lit from above: dark, with folds and a weave of low contrast.
-Vector3f backdrop_radiance(const SightRay& ray, double cos_table, double sin_table) {
+Vector3f backdrop_radiance(const Backdrop& backdrop, const SightRay& ray, double cos_table,
+                           double sin_table) {
   const auto to_station = [&](const Vector3d& v) {
     return Vector3d(cos_table * v.x() - sin_table * v.y(), sin_table * v.x() + cos_table * v.y(),
                     v.z());
@@ -113,39 +116,29 @@ Vector3f backdrop_radiance(const SightRay& ray, double cos_table, double sin_tab
   const Vector3d direction = to_station(ray.direction);
   const double a = direction.head<2>().squaredNorm();
   const double b = origin.head<2>().dot(direction.head<2>());
-  const double c = origin.head<2>().squaredNorm() - backdrop_radius_mm * backdrop_radius_mm;
+  const double c = origin.head<2>().squaredNorm() - Backdrop::radius_mm * Backdrop::radius_mm;
   // From inside there is one hit ahead; straight up or down there is none.
   if (c >= 0.0 || a < 1e-12) return Vector3f::Constant(0.02F);
   const double distance = (-b + std::sqrt(b * b - a * c)) / a;
-  const Vector3f x = (origin + distance * direction).cast<float>();
-  const auto footprint =
-      static_cast<float>(distance * std::max(ray.direction_dx.norm(), ray.direction_dy.norm()));
-  const float height = std::clamp((x.z() + 900.0F) / 1800.0F, 0.0F, 1.0F);
-  const float folds =
-      0.35F * gradient_noise(Vector3f(x.x() / 160.0F, x.y() / 160.0F, x.z() / 900.0F), 11U);
-  const float weave = 0.25F * visible_share(3.0F, footprint) * gradient_noise(x * 0.5F, 12U) +
-                      0.20F * gradient_noise(x / 45.0F, 13U);
-  const float light = 0.016F + 0.030F * height * height;
-  return light * (1.0F + folds + weave) * Vector3f(0.95F, 1.0F, 1.08F);
+  return backdrop.radiance(origin + distance * direction);
 }
 
 Vector3f board_albedo(const PlacedScene& scene, const SightRay& ray, const SurfacePoint& point) {
-  const Rigid3 board_from_table = scene.table_from_board.inverse();
-  const Vector3d normal = board_from_table.rotation * point.flat_normal;
+  const Vector3d normal = scene.board_rotation_table * point.flat_normal;
   if (normal.z() < 0.5) return Vector3f::Constant(0.35F);  // the plate's sides and back
   // How the point moves on the plane over the width of the filter.
   const double facing = ray.direction.dot(point.flat_normal);
   const auto shift = [&](const Vector3d& change) -> Vector3d {
-    return board_from_table.rotation *
+    return scene.board_rotation_table *
            (point.distance_mm *
             (change - ray.direction * (change.dot(point.flat_normal) / facing)));
   };
   const Vector3d along_x = shift(ray.direction_dx);
   const Vector3d along_y = shift(ray.direction_dy);
   // The upright rectangle with the variance of the parallelogram that the filter covers.
-  const double width = std::hypot(along_x.x(), along_y.x()) + 1e-6;
-  const double height = std::hypot(along_x.y(), along_y.y()) + 1e-6;
-  const Vector3d x_board = board_from_table * point.x_table;
+  const double width = std::sqrt(along_x.x() * along_x.x() + along_y.x() * along_y.x()) + 1e-6;
+  const double height = std::sqrt(along_x.y() * along_x.y() + along_y.y() * along_y.y()) + 1e-6;
+  const Vector3d x_board = to_board(scene, point.x_table);
   const auto white =
       static_cast<float>(scene.parts->print->whiteness(x_board.x(), x_board.y(), width, height));
   return Vector3f::Constant(ink_albedo + white * (paper_albedo - ink_albedo));
@@ -176,7 +169,7 @@ SurfacePoint hit_table(const PlacedScene& scene, const SightRay& ray) {
 void color_table(const PlacedScene& scene, const SightRay& ray, double cos_table, double sin_table,
                  SurfacePoint& point) {
   if (point.object == SceneObject::backdrop) {
-    point.albedo = backdrop_radiance(ray, cos_table, sin_table);
+    point.albedo = backdrop_radiance(scene.parts->backdrop, ray, cos_table, sin_table);
     return;
   }
   const auto footprint = static_cast<float>(
@@ -238,10 +231,11 @@ SurfacePoint specimen_point(const PlacedScene& scene,
   }
   point.object = SceneObject::specimen;
   point.distance_mm = hit.distance_mm;
-  point.x_table = *scene.table_from_specimen * x_specimen;
+  point.x_table = ray.origin + hit.distance_mm * ray.direction;
   point.normal = table_rotation_specimen * normal;
   point.flat_normal = table_rotation_specimen * flat;
-  point.shadow_origin = *scene.table_from_specimen * Vector3d(smooth + shadow_offset_mm * flat);
+  point.shadow_origin =
+      point.x_table + table_rotation_specimen * (smooth - x_specimen + shadow_offset_mm * flat);
   const auto footprint = static_cast<float>(
       hit.distance_mm * std::max(ray.direction_dx.norm(), ray.direction_dy.norm()));
   point.albedo = mesh.colors.empty() ? parts.bone.albedo(x_specimen, footprint) : color;

@@ -11,10 +11,13 @@
 
 namespace skullstation {
 
-/// Light that arrives along one sample's ray.
+/// Light that arrives along one sample's ray, and what tells whether its pixel needs more samples.
 struct TracedSample {
   Eigen::Vector3f radiance = Eigen::Vector3f::Zero();
   SceneObject object = SceneObject::backdrop;
+  float light = 0.0F;           ///< on the surface, shadows and texture left out
+  std::uint8_t lamps_seen = 0;  ///< one bit for each lamp that was looked for and is visible
+  std::uint8_t lamps_hidden = 0;
 };
 
 /// A sample to be traced: which one of which pixel.
@@ -43,7 +46,7 @@ class ViewTracer {
   Sight sight(const PixelSample& sample) const;
   double table_angle_deg(double time) const;
   void add_lamps(const SurfacePoint& point, const Sight& sight, const PixelSample& sample,
-                 std::size_t sample_number);
+                 std::size_t sample_number, TracedSample& traced);
 
   const PlacedScene& scene_;
   const PreparedOptics& optics_;
@@ -54,19 +57,33 @@ class ViewTracer {
   double still_sin_ = 0.0;
   Rigid3 station_from_camera_;
   Rigid3 specimen_from_table_;
-  Eigen::Matrix3d table_rotation_specimen_;
+  Eigen::Matrix3d station_rotation_camera_;
+  Eigen::Matrix3d table_rotation_specimen_ = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d specimen_rotation_table_ = Eigen::Matrix3d::Identity();
 
-  // What a shadow ray carries to its sample if nothing is in its way.
-  struct LampLight {
+  // A lamp with its directions, station frame.
+  struct Lamp {
+    SoftBox box;
+    Eigen::Vector3d facing;
+    Eigen::Vector3d half_width;
+    Eigen::Vector3d half_height;
+    double strength_at_1_mm;
+  };
+  std::vector<Lamp> lamps_;
+  int lamp_groups_ = 1;
+
+  // What a shadow ray takes from its sample if something is in its way.
+  struct LampShadow {
     std::size_t sample_number;
     Eigen::Vector3f radiance;
+    std::uint8_t lamp_bit;
   };
   std::vector<Sight> sights_;
   std::vector<SurfacePoint> points_;
   std::vector<SpecimenRay> rays_;
   std::vector<SpecimenHit> hits_;
   std::vector<SpecimenRay> shadow_rays_;
-  std::vector<LampLight> lamp_lights_;
+  std::vector<LampShadow> lamp_shadows_;
   std::vector<std::uint8_t> blocked_;
 };
 
