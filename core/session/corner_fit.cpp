@@ -71,83 +71,127 @@ struct Surroundings {
   double marker_v_px = 0.0;  ///< from the edge along v to the markers
 };
 
-/// The model's level at a pixel and its derivatives.
-double model(const Surroundings& around, const Unknowns& p, double x, double y, Unknowns& slope) {
-  const double dx = x - p[at_x];
-  const double dy = y - p[at_y];
-  const double cos_u = std::cos(p[angle_u]), sin_u = std::sin(p[angle_u]);
-  const double cos_v = std::cos(p[angle_v]), sin_v = std::sin(p[angle_v]);
-  // Signed distances from the edge along u and from the edge along v.
-  const double from_u = cos_u * dy - sin_u * dx;
-  const double from_v = cos_v * dy - sin_v * dx;
-  const double inverse_blur = std::exp(-p[log_blur]) * std::numbers::sqrt2 * 0.5;
-  const double s = from_u * inverse_blur;
-  const double t = from_v * inverse_blur;
-  const double edge_u = std::erf(s);
-  const double edge_v = std::erf(t);
-  constexpr double two_over_root_pi = 2.0 * std::numbers::inv_sqrtpi;
-  const double d_edge_u = two_over_root_pi * std::exp(-s * s);
-  const double d_edge_v = two_over_root_pi * std::exp(-t * t);
-  // Black where squares are black, and where a marker's corner begins in a white one.
-  double pattern = edge_u * edge_v;
-  double pattern_by_u = edge_v * d_edge_u;
-  double pattern_by_v = edge_u * d_edge_v;
-  double pattern_by_marker = 0.0;  // times log_blur's inner derivative, the shift's part
-  for (const double side : {-1.0, 1.0}) {
-    // In white squares the signed distances have the product's sign: both, or one turned.
-    const double a = (side * from_u - around.marker_u_px) * inverse_blur;
-    const double b = (side * around.sign * from_v - around.marker_v_px) * inverse_blur;
-    if (a < -4.0 || b < -4.0) continue;
-    const double in_u = 0.5 * (1.0 + std::erf(a));
-    const double in_v = 0.5 * (1.0 + std::erf(b));
-    const double d_in_u = 0.5 * two_over_root_pi * std::exp(-a * a);
-    const double d_in_v = 0.5 * two_over_root_pi * std::exp(-b * b);
-    const double depth = 2.0 * around.sign;
-    pattern -= depth * in_u * in_v;
-    pattern_by_u -= depth * in_v * d_in_u * side;
-    pattern_by_v -= depth * in_u * d_in_v * side * around.sign;
-    pattern_by_marker += depth * inverse_blur *
-                         (in_v * d_in_u * around.marker_u_px + in_u * d_in_v * around.marker_v_px);
+/// The picture that one set of unknowns predicts.
+class CornerModel {
+ public:
+  CornerModel(const Surroundings& around, const Unknowns& p)
+      : around_(around),
+        p_(p),
+        cos_u_(std::cos(p[angle_u])),
+        sin_u_(std::sin(p[angle_u])),
+        cos_v_(std::cos(p[angle_v])),
+        sin_v_(std::sin(p[angle_v])),
+        inverse_blur_(std::exp(-p[log_blur]) * std::numbers::sqrt2 * 0.5) {}
+
+  double level(double x, double y) const {
+    const double dx = x - p_[at_x];
+    const double dy = y - p_[at_y];
+    const double from_u = distance_from_u(dx, dy);
+    const double from_v = distance_from_v(dx, dy);
+    double pattern = std::erf(from_u * inverse_blur_) * std::erf(from_v * inverse_blur_);
+    for (const double side : {-1.0, 1.0}) {
+      const double a = marker_depth_u(side, from_u);
+      const double b = marker_depth_v(side, from_v);
+      if (a < out_of_reach || b < out_of_reach) continue;
+      pattern -= 0.5 * around_.sign * (1.0 + std::erf(a)) * (1.0 + std::erf(b));
+    }
+    return (p_[middle] + p_[contrast] * pattern) * light(dx, dy);
   }
-  const double paper = p[middle] + p[contrast] * pattern;
-  const double light = 1.0 + p[slope_x] * dx + p[slope_y] * dy;
-  const double by_u = light * p[contrast] * pattern_by_u * inverse_blur;
-  const double by_v = light * p[contrast] * pattern_by_v * inverse_blur;
-  slope[at_x] = by_u * sin_u + by_v * sin_v - paper * p[slope_x];
-  slope[at_y] = -by_u * cos_u - by_v * cos_v - paper * p[slope_y];
-  slope[angle_u] = -by_u * (sin_u * dy + cos_u * dx);
-  slope[angle_v] = -by_v * (sin_v * dy + cos_v * dx);
-  // d a / d log_blur = -a: the part of from_u and from_v, and that of the markers' distance, which
-  // enters a with the opposite sign.
-  slope[log_blur] = -by_u * from_u - by_v * from_v - light * p[contrast] * pattern_by_marker;
-  slope[middle] = light;
-  slope[contrast] = light * pattern;
-  slope[slope_x] = paper * dx;
-  slope[slope_y] = paper * dy;
-  return paper * light;
-}
+
+  /// The level with its derivatives by the unknowns.
+  double level(double x, double y, Unknowns& slope) const {
+    const double dx = x - p_[at_x];
+    const double dy = y - p_[at_y];
+    const double from_u = distance_from_u(dx, dy);
+    const double from_v = distance_from_v(dx, dy);
+    const double edge_u = std::erf(from_u * inverse_blur_);
+    const double edge_v = std::erf(from_v * inverse_blur_);
+    // Black where squares are black, and where a marker's corner begins in a white one.
+    double pattern = edge_u * edge_v;
+    double pattern_by_u = edge_v * erf_slope(from_u * inverse_blur_);
+    double pattern_by_v = edge_u * erf_slope(from_v * inverse_blur_);
+    double pattern_by_margin = 0.0;  // what the blur does by way of the markers' distance
+    for (const double side : {-1.0, 1.0}) {
+      const double a = marker_depth_u(side, from_u);
+      const double b = marker_depth_v(side, from_v);
+      if (a < out_of_reach || b < out_of_reach) continue;
+      const double in_u = 1.0 + std::erf(a);
+      const double in_v = 1.0 + std::erf(b);
+      const double by_a = 0.5 * around_.sign * in_v * erf_slope(a);
+      const double by_b = 0.5 * around_.sign * in_u * erf_slope(b);
+      pattern -= 0.5 * around_.sign * in_u * in_v;
+      pattern_by_u -= by_a * side;
+      pattern_by_v -= by_b * side * around_.sign;
+      pattern_by_margin +=
+          inverse_blur_ * (by_a * around_.marker_u_px + by_b * around_.marker_v_px);
+    }
+    const double paper = p_[middle] + p_[contrast] * pattern;
+    const double lit = light(dx, dy);
+    const double by_u = lit * p_[contrast] * pattern_by_u * inverse_blur_;
+    const double by_v = lit * p_[contrast] * pattern_by_v * inverse_blur_;
+    slope[at_x] = by_u * sin_u_ + by_v * sin_v_ - paper * p_[slope_x];
+    slope[at_y] = -by_u * cos_u_ - by_v * cos_v_ - paper * p_[slope_y];
+    slope[angle_u] = -by_u * (sin_u_ * dy + cos_u_ * dx);
+    slope[angle_v] = -by_v * (sin_v_ * dy + cos_v_ * dx);
+    slope[log_blur] = -by_u * from_u - by_v * from_v - lit * p_[contrast] * pattern_by_margin;
+    slope[middle] = lit;
+    slope[contrast] = lit * pattern;
+    slope[slope_x] = paper * dx;
+    slope[slope_y] = paper * dy;
+    return paper * lit;
+  }
+
+ private:
+  /// Where 1 + erf is nothing.
+  static constexpr double out_of_reach = -4.0;
+
+  static double erf_slope(double x) { return 2.0 * std::numbers::inv_sqrtpi * std::exp(-x * x); }
+  double light(double dx, double dy) const { return 1.0 + p_[slope_x] * dx + p_[slope_y] * dy; }
+  // Signed distances [px] from the edges along u and along v.
+  double distance_from_u(double dx, double dy) const { return cos_u_ * dy - sin_u_ * dx; }
+  double distance_from_v(double dx, double dy) const { return cos_v_ * dy - sin_v_ * dx; }
+  // How far inside the marker, in units of the blur: of the white square on one side of the edge
+  // along u or on the other. There the signed distances have the product's sign.
+  double marker_depth_u(double side, double from_u) const {
+    return (side * from_u - around_.marker_u_px) * inverse_blur_;
+  }
+  double marker_depth_v(double side, double from_v) const {
+    return (side * around_.sign * from_v - around_.marker_v_px) * inverse_blur_;
+  }
+
+  const Surroundings around_;
+  const Unknowns p_;
+  const double cos_u_, sin_u_, cos_v_, sin_v_;
+  const double inverse_blur_;
+};
 
 double squared_error(const Surroundings& around, const std::vector<Pixel>& pixels,
                      const Unknowns& p) {
-  Unknowns unused;
+  const CornerModel model(around, p);
   double sum = 0.0;
   for (const Pixel& pixel : pixels) {
-    const double error = model(around, p, pixel.x, pixel.y, unused) - pixel.level;
+    const double error = model.level(pixel.x, pixel.y) - pixel.level;
     sum += error * error;
   }
   return sum;
 }
 
-/// Levenberg-Marquardt (Marquardt 1963); returns the squared error reached.
-double minimise(const Surroundings& around, const std::vector<Pixel>& pixels, Unknowns& p) {
+/// Levenberg-Marquardt (Marquardt 1963), given up where the position runs off by more than
+/// `max_shift_px`; returns the squared error reached.
+double minimise(const Surroundings& around, const std::vector<Pixel>& pixels, double max_shift_px,
+                Unknowns& p) {
+  constexpr int max_iterations = 30;
+  constexpr double converged_px = 1e-3;
+  const Eigen::Vector2d start = p.head<2>();
   double error = squared_error(around, pixels, p);
   double damping = 1e-3;
-  for (int iteration = 0; iteration < 40; ++iteration) {
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
     Normal normal = Normal::Zero();
     Unknowns gradient = Unknowns::Zero();
     Unknowns slope;
+    const CornerModel model(around, p);
     for (const Pixel& pixel : pixels) {
-      const double residual = model(around, p, pixel.x, pixel.y, slope) - pixel.level;
+      const double residual = model.level(pixel.x, pixel.y, slope) - pixel.level;
       normal.selfadjointView<Eigen::Lower>().rankUpdate(slope);
       gradient += residual * slope;
     }
@@ -160,7 +204,7 @@ double minimise(const Surroundings& around, const std::vector<Pixel>& pixels, Un
       const Unknowns next = p + step;
       const double next_error = squared_error(around, pixels, next);
       if (next_error <= error) {
-        step_px = std::hypot(step[at_x], step[at_y]);
+        step_px = step.head<2>().norm();
         p = next;
         error = next_error;
         damping = std::max(1e-9, damping * 0.1);
@@ -169,7 +213,8 @@ double minimise(const Surroundings& around, const std::vector<Pixel>& pixels, Un
         damping *= 10.0;
       }
     }
-    if (!improved || step_px < 1e-4) break;
+    if (!improved || step_px < converged_px) break;
+    if (!((p.head<2>() - start).norm() <= 2.0 * max_shift_px)) break;
   }
   return error;
 }
@@ -216,7 +261,7 @@ std::optional<Eigen::Vector2d> fit_corner(const Image8& grey, const ExpectedCorn
       p[middle] = mean;
       p[contrast] = sign * std::sqrt(variance / static_cast<double>(pixels.size()));
     }
-    const double error = minimise(around, pixels, p);
+    const double error = minimise(around, pixels, expected.max_shift_px, p);
     const double shift = (p.head<2>() - expected.position_px).norm();
     // Negated comparisons also catch what is not a number.
     if (!(shift <= expected.max_shift_px)) return std::nullopt;
