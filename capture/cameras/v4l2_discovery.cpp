@@ -32,6 +32,7 @@ std::vector<std::string> video_nodes(const V4l2System& system) {
   }
   std::sort(numbered.begin(), numbered.end());
   std::vector<std::string> nodes;
+  nodes.reserve(numbered.size());
   for (auto& [number, node] : numbered) nodes.push_back(std::move(node));
   return nodes;
 }
