@@ -28,10 +28,11 @@ constexpr std::uint32_t buffer_error = vivid_controls + 66;
 constexpr std::uint32_t stream_start_error = vivid_controls + 69;
 constexpr std::uint32_t fatal_stream_error = vivid_controls + 70;
 
-/// udev makes the link last when a camera comes and takes it away when the camera is gone.
+/// udev makes the link last when a camera comes, and takes it away some time after the node has
+/// gone: the link itself is looked at, not what it leads to.
 void wait_for_link(bool there) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (std::filesystem::exists(VividDevice::stable_path()) != there) {
+  while (std::filesystem::is_symlink(VividDevice::stable_path()) != there) {
     if (std::chrono::steady_clock::now() > deadline) {
       throw std::system_error(std::make_error_code(std::errc::timed_out), "udev");
     }
