@@ -59,14 +59,12 @@ void cast(const SceneParts& parts, int first, int last, std::uint64_t seed, cons
 
 void compute_table_sky(PlacedScene& scene, const Rigid3& specimen_from_table, int threads) {
   const SceneParts& parts = *scene.parts;
-  constexpr int size = TableSky::size;
-  std::vector<float>& open = scene.table_sky.open;
-  open.assign(static_cast<std::size_t>(size) * size, 0.0F);
+  constexpr int size = TableMap::size;
+  std::vector<float> open(static_cast<std::size_t>(size) * size, 0.0F);
   const Vector3d up = specimen_from_table.rotation * Vector3d::UnitZ();
   parallel_for(size, threads, [&](int row) {
     const auto point_at = [&](int column) {
-      const Vector3d x_table((column - size / 2) * TableSky::spacing_mm,
-                             (row - size / 2) * TableSky::spacing_mm, 0.0);
+      const Vector3d x_table(TableMap::place_mm(column), TableMap::place_mm(row), 0.0);
       return std::pair{specimen_from_table * x_table, up};
     };
     float* open_row = open.data() + static_cast<std::size_t>(row) * size;
@@ -75,6 +73,7 @@ void compute_table_sky(PlacedScene& scene, const Rigid3& specimen_from_table, in
            if (!blocked) open_row[column] += 1.0F / static_cast<float>(parts.options.ambient_rays);
          });
   });
+  scene.table_sky = TableMap(std::move(open)).smoothed();
 }
 
 void compute_vertex_ambient(PlacedScene& scene, int threads) {
@@ -128,23 +127,9 @@ float open_ambient(const SceneOptions& options, double normal_z) {
          static_cast<float>(1.0 - above) * below;
 }
 
-float TableSky::at(double x_table, double y_table) const {
-  if (open.empty()) return 1.0F;
-  const double x = x_table / spacing_mm + size / 2;
-  const double y = y_table / spacing_mm + size / 2;
-  if (!(x >= 0.0 && y >= 0.0 && x < size - 1 && y < size - 1)) return 1.0F;
-  const int column = static_cast<int>(x);
-  const int row = static_cast<int>(y);
-  const auto u = static_cast<float>(x - column);
-  const auto v = static_cast<float>(y - row);
-  const float* corner = open.data() + static_cast<std::size_t>(row) * size + column;
-  return (1.0F - v) * ((1.0F - u) * corner[0] + u * corner[1]) +
-         v * ((1.0F - u) * corner[size] + u * corner[size + 1]);
-}
-
 void compute_ambient(PlacedScene& scene, int threads) {
   scene.vertex_ambient.clear();
-  scene.table_sky.open.clear();
+  scene.table_sky = {};
   if (!scene.parts->surface || !scene.table_from_specimen) return;
   compute_table_sky(scene, scene.table_from_specimen->inverse(), threads);
   compute_vertex_ambient(scene, threads);

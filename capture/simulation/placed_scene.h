@@ -10,6 +10,7 @@
 #include "capture/simulation/sample_table.h"
 #include "capture/simulation/scene.h"
 #include "capture/simulation/specimen_surface.h"
+#include "capture/simulation/table_map.h"
 #include "core/transform.h"
 
 namespace skullstation {
@@ -48,16 +49,6 @@ struct Ambient {
   float from_bone = 0.0F;
 };
 
-/// How much of the sky the specimen leaves to the points of the table's top: a square grid in the
-/// table frame, bilinear between its points, 1 outside.
-struct TableSky {
-  static constexpr int size = 141;
-  static constexpr double spacing_mm = 4.0;
-  std::vector<float> open;  ///< size x size, row-major, y upwards; empty: no specimen
-
-  float at(double x_table, double y_table) const;
-};
-
 /// The scene at one moment: what the renderer sees. Never changed after it was made.
 struct PlacedScene {
   std::shared_ptr<const SceneParts> parts;
@@ -65,7 +56,7 @@ struct PlacedScene {
   Eigen::Matrix3d board_rotation_table;  ///< as a matrix: every ray of sight needs it
   std::optional<Rigid3> table_from_specimen;
   std::vector<Ambient> vertex_ambient;  ///< per vertex of the shading mesh; empty: no specimen
-  TableSky table_sky;
+  TableMap table_sky;  ///< how much of the sky the specimen leaves to the table's top
 };
 
 /// Radiance of the room in a direction (unit, z up) and the ambient light on a surface that sees

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr int tile_px = 32;
+constexpr int tile_px = 16;
 
 /// The samples of a pixel so far.
 struct PixelSum {
@@ -86,32 +86,37 @@ ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics
                        std::span<const double> table_angles_deg, const RenderOptions& options) {
   const std::shared_ptr<const PlacedScene> placed = scene.placed();
   const Lens& lens = optics.optics().lens;
+  const std::vector<Lamp> lamps = make_lamps(placed->parts->options.lights);
+  const std::vector<TableMap> lamps_seen = lamps_seen_from_table(
+      *placed, lamps, table_angles_deg[table_angles_deg.size() / 2], options.threads);
   const Tiles tiles{lens.width, lens.height};
   std::vector<PixelSum> sums(static_cast<std::size_t>(lens.width) * lens.height);
   const auto sum_of = [&](int x, int y) -> PixelSum& {
     return sums[static_cast<std::size_t>(y) * lens.width + x];
   };
-  const auto trace_tile = [&](int tile, int first, int last, const auto& wanted) {
+  const auto trace_tile = [&](int tile, int count, bool lamps_in_turn, const auto& wanted) {
     std::vector<PixelSample> samples;
     tiles.for_pixels(tile, [&](int x, int y) {
       if (!wanted(x, y)) return;
-      for (int i = first; i < last; ++i) samples.push_back({x, y, i});
+      sum_of(x, y) = {};
+      for (int i = 0; i < count; ++i) samples.push_back({x, y, i});
     });
     if (samples.empty()) return;
-    ViewTracer tracer(*placed, optics, table_angles_deg, options);
+    ViewTracer tracer(*placed, optics, lamps, lamps_seen, table_angles_deg, options);
     std::vector<TracedSample> traced(samples.size());
-    tracer.trace(samples, traced);
+    tracer.trace(samples, lamps_in_turn, traced);
     for (std::size_t i = 0; i < samples.size(); ++i) {
       sum_of(samples[i].x, samples[i].y).add(traced[i]);
     }
   };
 
+  const bool lamps_in_turn = options.samples >= 4 && options.samples % 2 == 0;
   parallel_for(tiles.count(), options.threads, [&](int tile) {
-    trace_tile(tile, 0, options.samples, [](int, int) { return true; });
+    trace_tile(tile, options.samples, lamps_in_turn, [](int, int) { return true; });
   });
 
-  // More samples where the first ones disagree, and beside such pixels: there the first few may
-  // have missed an edge. Deciding by the neighbours, too, keeps edges where they are.
+  // Again, with more samples, where the first ones disagree, and beside such pixels: there the
+  // first few may have missed an edge. Starting afresh keeps the choice from biasing the result.
   std::vector<char> uneven(sums.size());
   std::transform(sums.begin(), sums.end(), uneven.begin(), [&](const PixelSum& sum) {
     return sum.uneven(static_cast<float>(options.uneven_light)) ? 1 : 0;
@@ -133,7 +138,7 @@ ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics
       }
     });
     parallel_for(tiles.count(), options.threads, [&](int tile) {
-      trace_tile(tile, options.samples, options.samples_where_uneven, [&](int x, int y) {
+      trace_tile(tile, options.samples_where_uneven, false, [&](int x, int y) {
         return again[static_cast<std::size_t>(y) * lens.width + x] != 0;
       });
     });

@@ -176,9 +176,9 @@ void color_table(const PlacedScene& scene, const SightRay& ray, double cos_table
       point.distance_mm * std::max(ray.direction_dx.norm(), ray.direction_dy.norm()));
   point.albedo = point.object == SceneObject::board ? board_albedo(scene, ray, point)
                                                     : platter_albedo(point, footprint);
-  // The specimen's shade is known for the table's top.
   float light = open_ambient(scene.parts->options, point.flat_normal.z());
-  if (std::abs(point.x_table.z()) < 5.0 && point.flat_normal.z() > 0.9) {
+  point.on_table_top = std::abs(point.x_table.z()) < 5.0 && point.flat_normal.z() > 0.9;
+  if (point.on_table_top) {
     light *= scene.table_sky.at(point.x_table.x(), point.x_table.y());
   }
   point.ambient = light * point.albedo;

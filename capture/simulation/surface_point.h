@@ -26,6 +26,7 @@ struct SurfacePoint {
   Eigen::Vector3f albedo;         ///< linear RGB; of the backdrop: its radiance
   Eigen::Vector3f ambient;        ///< radiance that the ambient light leaves
   float gloss = 0.0F;
+  bool on_table_top = false;  ///< the specimen's shade there is known (TableMap)
 };
 
 /// What the ray hits of the platter and the board, its place, normals and object; the backdrop if

@@ -34,27 +34,18 @@ Vector3d about_z(const Vector3d& v, double cosine, double sine) {
 }  // namespace
 
 ViewTracer::ViewTracer(const PlacedScene& scene, const PreparedOptics& optics,
+                       std::span<const Lamp> lamps, std::span<const TableMap> lamps_seen,
                        std::span<const double> table_angles_deg, const RenderOptions& options)
     : scene_(scene),
       optics_(optics),
+      lamps_(lamps),
+      lamps_seen_(lamps_seen),
       table_angles_deg_(table_angles_deg.begin(), table_angles_deg.end()),
       options_(options),
       station_from_camera_(optics.optics().camera_from_station.inverse()),
       station_rotation_camera_(station_from_camera_.rotation.toRotationMatrix()) {
   moving_ = std::ranges::any_of(table_angles_deg_,
                                 [&](double angle) { return angle != table_angles_deg_.front(); });
-  for (const SoftBox& box : scene.parts->options.lights) {
-    const Vector3d axis = box.target_mm - box.centre_mm;
-    const Vector3d facing = axis.normalized();
-    Vector3d across = facing.cross(Vector3d::UnitZ());
-    if (across.norm() < 1e-9) across = Vector3d::UnitX();
-    across.normalize();
-    lamps_.push_back({box, facing, 0.5 * box.width_mm * across,
-                      0.5 * box.height_mm * facing.cross(across),
-                      box.strength * axis.squaredNorm()});
-  }
-  const bool even = options.samples % 2 == 0 && options.samples_where_uneven % 2 == 0;
-  lamp_groups_ = lamps_.size() > 1 && options.samples >= 4 && even ? 2 : 1;
   still_cos_ = std::cos(radians(table_angles_deg_.front()));
   still_sin_ = std::sin(radians(table_angles_deg_.front()));
   if (scene.table_from_specimen) {
@@ -118,23 +109,23 @@ ViewTracer::Sight ViewTracer::sight(const PixelSample& sample) const {
 }
 
 void ViewTracer::add_lamps(const SurfacePoint& point, const Sight& sight, const PixelSample& sample,
-                           std::size_t sample_number, TracedSample& traced) {
+                           std::size_t sample_number, bool lamps_in_turn, TracedSample& traced) {
+  const int groups = lamps_in_turn ? 2 : 1;
   const auto to_table = [&](const Vector3d& v) {
     return about_z(v, sight.cos_table, -sight.sin_table);
   };
   for (std::size_t i = 0; i < lamps_.size(); ++i) {
     const Lamp& lamp = lamps_[i];
-    const int group = static_cast<int>(i) % lamp_groups_;
-    const Eigen::Vector2f& at = scene_.parts->samples.at(mix(sight.pixel_hash, on_first_lamp + i),
-                                                         sample.index / lamp_groups_);
-    const Vector3d on_lamp = lamp.box.centre_mm +
-                             (2.0 * static_cast<double>(at.x()) - 1.0) * lamp.half_width +
-                             (2.0 * static_cast<double>(at.y()) - 1.0) * lamp.half_height;
-    const Vector3d to_lamp = to_table(on_lamp) - point.shadow_origin;
+    const int group = static_cast<int>(i) % groups;
+    const Eigen::Vector2f& at =
+        scene_.parts->samples.at(mix(sight.pixel_hash, on_first_lamp + i), sample.index / groups);
+    const Vector3d facing = to_table(lamp.facing);
+    traced.light += static_cast<float>(lamp.strength * std::max(0.0, -facing.dot(point.normal)));
+    const Vector3d to_lamp = to_table(lamp.at(at)) - point.shadow_origin;
     const double distance = to_lamp.norm();
     const Vector3d direction = to_lamp / distance;
     const double cosine = point.normal.dot(direction);
-    const double lamp_cosine = -to_table(lamp.facing).dot(direction);
+    const double lamp_cosine = -facing.dot(direction);
     if (cosine <= 0.0 || lamp_cosine <= 0.0 || point.flat_normal.dot(direction) <= 0.0) continue;
 
     // `strength` is what a white diffuser at the target sends back; from there the light falls
@@ -148,19 +139,21 @@ void ViewTracer::add_lamps(const SurfacePoint& point, const Sight& sight, const 
       const auto along = static_cast<float>(std::max(0.0, point.normal.dot(half)));
       radiance.array() += light * point.gloss * (gloss_exponent + 8.0F) / 8.0F * highlight(along);
     }
+    if (point.on_table_top) {
+      traced.radiance += lamps_seen_[i].at(point.x_table.x(), point.x_table.y()) * radiance;
+      continue;
+    }
     traced.radiance += radiance;
-    traced.light += light;
-    // The lamps take turns: each sample looks for one group of them only, and what it finds counts
-    // for the others of its pixel too. Where no lamp is hidden that leaves no noise at all.
-    if (sample.index % lamp_groups_ != group || !scene_.table_from_specimen) continue;
-    lamp_shadows_.push_back({sample_number, static_cast<float>(lamp_groups_) * radiance,
-                             static_cast<std::uint8_t>(1U << i)});
+    if (sample.index % groups != group || !scene_.table_from_specimen) continue;
+    lamp_shadows_.push_back(
+        {sample_number, static_cast<float>(groups) * radiance, static_cast<std::uint8_t>(1U << i)});
     shadow_rays_.push_back({specimen_from_table_ * point.shadow_origin,
                             specimen_rotation_table_ * direction, distance});
   }
 }
 
-void ViewTracer::trace(std::span<const PixelSample> samples, std::span<TracedSample> traced) {
+void ViewTracer::trace(std::span<const PixelSample> samples, bool lamps_in_turn,
+                       std::span<TracedSample> traced) {
   const bool specimen = scene_.table_from_specimen.has_value();
   sights_.clear();
   points_.clear();
@@ -194,7 +187,7 @@ void ViewTracer::trace(std::span<const PixelSample> samples, std::span<TracedSam
     }
     traced[i].radiance = point.ambient;
     traced[i].light = point.ambient.sum() / std::max(1e-6F, point.albedo.sum());
-    add_lamps(point, sights_[i], samples[i], i, traced[i]);
+    add_lamps(point, sights_[i], samples[i], i, lamps_in_turn, traced[i]);
   }
   blocked_.assign(shadow_rays_.size(), 0);
   if (specimen) scene_.parts->surface->occluded(shadow_rays_, blocked_);

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "capture/simulation/lamps.h"
 #include "capture/simulation/render.h"
 #include "capture/simulation/surface_point.h"
 
@@ -15,7 +16,7 @@ namespace skullstation {
 struct TracedSample {
   Eigen::Vector3f radiance = Eigen::Vector3f::Zero();
   SceneObject object = SceneObject::backdrop;
-  float light = 0.0F;           ///< on the surface, shadows and texture left out
+  float light = 0.0F;           ///< on the surface as it is turned, shadows and texture left out
   std::uint8_t lamps_seen = 0;  ///< one bit for each lamp that was looked for and is visible
   std::uint8_t lamps_hidden = 0;
 };
@@ -30,11 +31,16 @@ struct PixelSample {
 /// Traces samples of one view. One for each thread: it keeps buffers between calls.
 class ViewTracer {
  public:
-  ViewTracer(const PlacedScene& scene, const PreparedOptics& optics,
-             std::span<const double> table_angles_deg, const RenderOptions& options);
+  /// `lamps_seen` as of lamps_seen_from_table().
+  ViewTracer(const PlacedScene& scene, const PreparedOptics& optics, std::span<const Lamp> lamps,
+             std::span<const TableMap> lamps_seen, std::span<const double> table_angles_deg,
+             const RenderOptions& options);
 
-  /// The light of each sample; `traced` is as long as `samples`.
-  void trace(std::span<const PixelSample> samples, std::span<TracedSample> traced);
+  /// The light of each sample; `traced` is as long as `samples`. With `lamps_in_turn` each sample
+  /// looks for every other lamp only, and what it finds counts twice: as good where each lamp is
+  /// either seen or hidden by all samples of a pixel, at half the cost.
+  void trace(std::span<const PixelSample> samples, bool lamps_in_turn,
+             std::span<TracedSample> traced);
 
  private:
   struct Sight {
@@ -46,10 +52,12 @@ class ViewTracer {
   Sight sight(const PixelSample& sample) const;
   double table_angle_deg(double time) const;
   void add_lamps(const SurfacePoint& point, const Sight& sight, const PixelSample& sample,
-                 std::size_t sample_number, TracedSample& traced);
+                 std::size_t sample_number, bool lamps_in_turn, TracedSample& traced);
 
   const PlacedScene& scene_;
   const PreparedOptics& optics_;
+  std::span<const Lamp> lamps_;
+  std::span<const TableMap> lamps_seen_;
   std::vector<double> table_angles_deg_;
   RenderOptions options_;
   bool moving_ = false;
@@ -60,17 +68,6 @@ class ViewTracer {
   Eigen::Matrix3d station_rotation_camera_;
   Eigen::Matrix3d table_rotation_specimen_ = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d specimen_rotation_table_ = Eigen::Matrix3d::Identity();
-
-  // A lamp with its directions, station frame.
-  struct Lamp {
-    SoftBox box;
-    Eigen::Vector3d facing;
-    Eigen::Vector3d half_width;
-    Eigen::Vector3d half_height;
-    double strength_at_1_mm;
-  };
-  std::vector<Lamp> lamps_;
-  int lamp_groups_ = 1;
 
   // What a shadow ray takes from its sample if something is in its way.
   struct LampShadow {
