@@ -72,7 +72,8 @@ TEST_F(CommandLine, TheSameSeedGivesTheSameBytesForAnyNumberOfThreads) {
         {"scan", "--threads", threads, "--config", config.string(), "--out", folder_ / threads});
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
-  EXPECT_EQ(read_file(folder_ / "1/session.json"), read_file(folder_ / "2/session.json"));
+  EXPECT_EQ(read_file(folder_ / "1/session.json").value(),
+            read_file(folder_ / "2/session.json").value());
 }
 
 TEST_F(CommandLine, AMissingConfigurationIsNamed) {
