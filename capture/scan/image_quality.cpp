@@ -5,7 +5,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -107,49 +106,34 @@ int laplacian(const std::uint8_t* p, std::ptrdiff_t stride) {
 }
 
 /// Mean product of the two frames' Laplacians over the mask: their energy, without the noise,
-/// which is independent between frames. With one frame, the product with itself less the noise.
-double detail_energy(const cv::Mat& image, const cv::Mat* earlier, const cv::Mat& mask) {
+/// which is independent between frames.
+double detail_energy(const cv::Mat& image, const cv::Mat& earlier, const cv::Mat& mask) {
   const int mask_scale =
       std::max(1, static_cast<int>(std::lround(static_cast<double>(image.cols) / mask.cols)));
   const auto stride = static_cast<std::ptrdiff_t>(image.step);
+  const auto earlier_stride = static_cast<std::ptrdiff_t>(earlier.step);
   std::int64_t product = 0;
-  std::int64_t magnitude = 0;
   std::int64_t pixels = 0;
   for (int y = 1; y + 1 < image.rows; ++y) {
-    const int mask_y = std::min(y / mask_scale, mask.rows - 1);
-    const std::uint8_t* mask_row = mask.ptr(mask_y);
+    const std::uint8_t* mask_row = mask.ptr(std::min(y / mask_scale, mask.rows - 1));
     const std::uint8_t* row = image.ptr(y);
-    const std::uint8_t* earlier_row = earlier != nullptr ? earlier->ptr(y) : row;
+    const std::uint8_t* earlier_row = earlier.ptr(y);
     for (int x = 1; x + 1 < image.cols; ++x) {
       if (mask_row[std::min(x / mask_scale, mask.cols - 1)] == 0) continue;
-      const int here = laplacian(row + x, stride);
-      product += static_cast<std::int64_t>(here) * laplacian(earlier_row + x, stride);
-      // Immerkær's kernel (1 -2 1; -2 4 -2; 1 -2 1) does not see edges and ramps.
-      if (earlier == nullptr) {
-        const std::uint8_t* p = row + x;
-        magnitude += std::abs(p[-stride - 1] + p[-stride + 1] + p[stride - 1] + p[stride + 1] -
-                              2 * (p[-1] + p[1] + p[-stride] + p[stride]) + 4 * p[0]);
-      }
+      product += static_cast<std::int64_t>(laplacian(row + x, stride)) *
+                 laplacian(earlier_row + x, earlier_stride);
       ++pixels;
     }
   }
   if (pixels == 0) return 0.0;
-  const double energy = static_cast<double>(product) / static_cast<double>(pixels);
-  const double noise_sd = std::sqrt(std::numbers::pi / 2.0) / 6.0 * static_cast<double>(magnitude) /
-                          static_cast<double>(pixels);
-  // The Laplacian's weights squared and added: 1 + 1 + 1 + 1 + 16.
-  return std::max(0.0, energy - 20.0 * noise_sd * noise_sd);
+  return std::max(0.0, static_cast<double>(product) / static_cast<double>(pixels));
 }
 
-double sharpness(const cv::Mat& grey, const cv::Mat* earlier, const cv::Mat& specimen) {
+double sharpness(const cv::Mat& grey, const cv::Mat& earlier, const cv::Mat& specimen) {
   cv::Mat inside;  // silhouettes are strong edges in any view
   cv::erode(specimen, inside, cv::Mat(), {-1, -1}, 3, cv::BORDER_CONSTANT, cv::Scalar(0));
-  const cv::Mat quarter = reduced(grey, 4);
-  cv::Mat earlier_quarter;
-  if (earlier != nullptr) earlier_quarter = reduced(*earlier, 4);
   const double fine = detail_energy(grey, earlier, inside);
-  const double coarse =
-      detail_energy(quarter, earlier != nullptr ? &earlier_quarter : nullptr, inside);
+  const double coarse = detail_energy(reduced(grey, 4), reduced(earlier, 4), inside);
   return coarse > 0.0 ? fine / coarse : 0.0;
 }
 
@@ -231,6 +215,8 @@ double motion_px(const cv::Mat& before, const cv::Mat& after, const cv::Mat& tur
 ViewQuality measure_view(const Image8& image, const Image8* earlier,
                          const std::optional<CharucoBoard>& board) {
   ViewQuality quality;
+  constexpr int smallest_px = 16;  // nothing can be told about less
+  if (std::min(image.width, image.height) < smallest_px) return quality;
   const Image8 grey = grey_of(image);
   std::vector<BoardCorner> corners;
   if (board) corners = board_corners(grey, *board);
@@ -240,16 +226,14 @@ ViewQuality measure_view(const Image8& image, const Image8* earlier,
   measure_levels(image, grey, regions.specimen, quality);
   quality.border_percent = border_percent(regions.specimen);
 
-  const cv::Mat specimen = view_of(regions.specimen);
-  if (earlier == nullptr) {
-    quality.sharpness = sharpness(view_of(grey), nullptr, specimen);
-    return quality;
-  }
-  const Image8 earlier_grey = grey_of(*earlier);
+  const Image8 earlier_grey = earlier != nullptr ? grey_of(*earlier) : grey;
   const cv::Mat before = view_of(earlier_grey);
-  quality.sharpness = sharpness(view_of(grey), &before, specimen);
-  const cv::Mat turning = specimen | view_of(regions.board);
-  quality.motion_px = motion_px(before, view_of(grey), turning);
+  const cv::Mat after = view_of(grey);
+  const cv::Mat specimen = view_of(regions.specimen);
+  quality.sharpness = sharpness(after, before, specimen);
+  if (earlier != nullptr) {
+    quality.motion_px = motion_px(before, after, specimen | view_of(regions.board));
+  }
   return quality;
 }
 

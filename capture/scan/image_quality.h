@@ -34,8 +34,8 @@ struct QualityGates {
 /// Measures one view.
 ///
 /// `image` is grey or RGB; `earlier` a second frame of the same scene at rest, taken shortly
-/// before (null if there is none: motion_px stays 0). With it, noise is removed exactly, since it
-/// is independent between the two; without it, it is estimated (Immerkær 1996).
+/// before, of the same size. Noise is told from detail by being independent between the two. Null
+/// if there is none: noise then counts as detail, and motion_px stays 0.
 ///
 /// - sharpness: energy of the specimen's finest detail (Laplacian at full resolution) over that
 ///   of detail four times as coarse, noise removed from both. The ratio does not depend on the
