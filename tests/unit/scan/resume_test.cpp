@@ -48,6 +48,7 @@ void expect_resumes(const fs::path& folder, const std::string& when) {
   // What a real crash leaves behind besides.
   std::ofstream(folder / SpaceReserve::file_name) << std::string(10'000, 'x');
   TestBench bench;
+  bench.use_instant_turntable();
   const Result<ScanReport> report = bench.scan(folder);
   ASSERT_TRUE(report) << when << report.error().message();
   EXPECT_EQ(report->kept, static_cast<int>(before.size())) << when;
@@ -70,9 +71,10 @@ template <class Arrange>
 void crash_and_resume(const std::string& when, const Arrange& arrange) {
   const TemporaryFolder folder;
   TestBench bench;
+  bench.use_instant_turntable();
   arrange(bench);
   ASSERT_THROW(static_cast<void>(bench.scan(folder.path())), Crash) << when;
-  EXPECT_FALSE(bench.station.motor_current_on()) << when;
+  EXPECT_FALSE(bench.motor_is_on()) << when;
   EXPECT_FALSE(bench.station.lights_on()) << when;
   expect_resumes(folder.path(), when);
 }
@@ -257,7 +259,7 @@ TEST(Resume, AnotherPlanIsRefusedAndTheDifferenceNamed) {
     EXPECT_THAT(report.error().message(), HasSubstr("holds a session of another scan"));
     EXPECT_THAT(report.error().message(), HasSubstr(expected));
     EXPECT_EQ(*read_file(folder / "session.json"), before);
-    EXPECT_FALSE(bench.station.motor_current_on());
+    EXPECT_FALSE(bench.motor_is_on());
   }
 }
 

@@ -26,7 +26,7 @@ using testing::TemporaryFolder;
 using testing::TestBench;
 
 void expect_at_rest(const TestBench& bench) {
-  EXPECT_FALSE(bench.station.motor_current_on());
+  EXPECT_FALSE(bench.motor_is_on());
   EXPECT_FALSE(bench.station.lights_on());
 }
 
@@ -328,6 +328,7 @@ TEST(RunScan, CancelledAnywhereItEndsAtRest) {
   for (int at_report = 1; at_report < 18; ++at_report) {
     const TemporaryFolder folder;
     TestBench bench;
+    bench.use_instant_turntable();
     std::stop_source stop;
     Progress progress;
     progress.stop = stop.get_token();
@@ -403,6 +404,7 @@ TEST(RunScan, AWriteThatFailsAnywhereEndsTheScanAndLosesNothing) {
   for (int failing = 1; failing <= 25; ++failing) {
     const TemporaryFolder folder;
     TestBench bench;
+    bench.use_instant_turntable();
     bench.before_write = [&](int write) -> Result<void> {
       if (write == failing) return fail(ErrorKind::bad_input, "disk", "No space left on device");
       return {};

@@ -54,11 +54,30 @@ Result<void> FakeCamera::reopen() {
   return {};
 }
 
+Result<void> InstantTurntable::move_to(double angle_deg, std::stop_token stop) {
+  if (stop.stop_requested()) return fail(ErrorKind::cancelled, "turntable", "stopped on request");
+  angle_deg_ = angle_deg;
+  return {};
+}
+
+Result<void> InstantTurntable::release() {
+  angle_deg_.reset();
+  return {};
+}
+
 TestBench::TestBench(const SimulatedFaults& faults, const TurntableConfig& turntable)
     : station(turntable, faults, clock, 1), hardware(station.hardware()) {
   options.plan.rings = {{"cam0", 4}, {"cam1", 2}};
   options.station = "ST-01";
   options.case_number = "2026-0042";
+}
+
+void TestBench::use_instant_turntable() {
+  hardware.turntable = std::make_unique<InstantTurntable>();
+}
+
+bool TestBench::motor_is_on() const {
+  return station.motor_current_on() || hardware.turntable->angle_deg().has_value();
 }
 
 Result<ScanReport> TestBench::scan(const fs::path& folder, const Progress& progress) {

@@ -2,7 +2,9 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -50,10 +52,26 @@ class FakeCamera final : public Camera {
   bool unplugged_ = false;
 };
 
+/// A turntable that is where it shall be at once: for tests that scan a hundred times.
+class InstantTurntable final : public Turntable {
+ public:
+  Result<void> home(std::stop_token stop) override { return move_to(0.0, std::move(stop)); }
+  Result<void> move_to(double angle_deg, std::stop_token stop) override;
+  Result<void> release() override;
+  std::optional<double> angle_deg() const override { return angle_deg_; }
+
+ private:
+  std::optional<double> angle_deg_;
+};
+
 /// A simulated station with two fake cameras in virtual time, and a small scan for it: rings of 4
 /// and 2 views in 2 passes, 12 views in all.
 struct TestBench {
   explicit TestBench(const SimulatedFaults& faults = {}, const TurntableConfig& turntable = {});
+
+  /// Replaces the simulated platter, its thread and its steps.
+  void use_instant_turntable();
+  bool motor_is_on() const;
 
   /// Scans into `folder`; may throw Crash.
   Result<ScanReport> scan(const std::filesystem::path& folder, const Progress& progress = {});
