@@ -140,15 +140,17 @@ void add_normals(const Divided& mesh, ShadingMesh& shading) {
   }
   // Weighted by area, over the triangles that are not across a crease.
   const double smooth_cosine = std::cos(radians(crease_deg));
+  std::vector<double> lengths;
+  lengths.reserve(normals.size());
+  for (const Vector3d& normal : normals) lengths.push_back(normal.norm());
   shading.corner_normals.reserve(3 * mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const double own_length = normals[t].norm();
     for (const int v : mesh.triangles[t]) {
       Vector3d sum = normals[t];
       for (int i = first[v]; i < first[v + 1]; ++i) {
         const Vector3d& other = normals[around[i]];
         if (around[i] != static_cast<int>(t) &&
-            other.dot(normals[t]) > smooth_cosine * own_length * other.norm()) {
+            other.dot(normals[t]) > smooth_cosine * lengths[t] * lengths[around[i]]) {
           sum += other;
         }
       }

@@ -150,8 +150,11 @@ Result<std::unique_ptr<Camera>> SimulatedRoom::open_camera(const CameraConfig& c
 void SimulatedRoom::place_specimen(int pass) { scene_->set_specimen_pose(placement(pass)); }
 
 void SimulatedRoom::hold_board(const CameraConfig& camera, const Rigid3& camera_from_board) {
-  // The table stands at 0 while the board is held, so that table and station frames agree.
-  scene_->set_board_pose(optics_of(camera).camera_from_station.inverse() * camera_from_board);
+  const Rigid3 station_from_board =
+      optics_of(camera).camera_from_station.inverse() * camera_from_board;
+  // The scene counts in the table's frame, and the table stands wherever it was left.
+  const Rigid3 table_from_station = rotation_about_z(-station_->true_table_angle_deg(clock_.now()));
+  scene_->set_board_pose(table_from_station * station_from_board);
 }
 
 void SimulatedRoom::note_truth(const std::string& image, int pass) {
