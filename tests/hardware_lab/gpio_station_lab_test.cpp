@@ -1,9 +1,12 @@
 // The GPIO backend as the kernel sees it: pulses, levels, order and reaction by its own record.
 
 #include <gmock/gmock.h>
+#include <grp.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <iostream>
 #include <thread>
 
@@ -197,6 +200,17 @@ TEST_F(GpioOpeningLab, LinesAreFoundByNameOnAnyChip) {
   const auto opened = open();
   ASSERT_TRUE(opened) << opened.error().message();
   EXPECT_FALSE(opened->interlock->tripped());
+}
+
+TEST_F(GpioOpeningLab, UdevGivesTheChipToTheGroupGpio) {
+  const auto station = make_gpio_sim_station();
+  ASSERT_EQ(std::system("udevadm settle --timeout=60"), 0);
+  struct stat node {};
+  ASSERT_EQ(::stat(station->device_path().c_str(), &node), 0);
+  const group* const gpio = ::getgrnam("gpio");
+  ASSERT_NE(gpio, nullptr);
+  EXPECT_EQ(node.st_gid, gpio->gr_gid);
+  EXPECT_EQ(node.st_mode & 0777, 0660u);
 }
 
 TEST_F(GpioOpeningLab, AStopThatIsPressedAlreadyTrips) {
