@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -26,6 +27,7 @@ struct PixelSum {
   std::uint8_t objects = 0;  ///< one bit for each SceneObject
   std::uint8_t lamps_seen = 0;
   std::uint8_t lamps_hidden = 0;
+  std::uint8_t lamps_behind = 0;
   std::uint8_t count = 0;
 
   void add(const TracedSample& sample) {
@@ -35,11 +37,12 @@ struct PixelSum {
     objects |= static_cast<std::uint8_t>(1U << static_cast<unsigned>(sample.object));
     lamps_seen |= sample.lamps_seen;
     lamps_hidden |= sample.lamps_hidden;
+    lamps_behind |= sample.lamps_behind;
     ++count;
   }
   /// An outline, the edge of a shadow or a sharp turn of the surface runs through it.
   bool uneven(float contrast) const {
-    return (objects & (objects - 1)) != 0 || (lamps_seen & lamps_hidden) != 0 ||
+    return (objects & (objects - 1)) != 0 || (lamps_hidden & (lamps_seen | lamps_behind)) != 0 ||
            most_light - least_light > contrast * (most_light + least_light);
   }
 };
@@ -71,12 +74,14 @@ Result<void> RenderOptions::validate() const {
   const auto bad = [](const char* option, const std::string& what) {
     return fail(ErrorKind::bad_input, fmt::format("simulated camera, {}", option), what);
   };
-  if (samples < 1 || samples > SampleTable::points) {
-    return bad("samples", fmt::format("must be 1 to {}", SampleTable::points));
+  if (samples < 1 || samples > SampleTable::points ||
+      !std::has_single_bit(static_cast<unsigned>(samples))) {
+    return bad("samples", fmt::format("must be a power of two up to {}", SampleTable::points));
   }
-  if (samples_where_uneven < samples || samples_where_uneven > SampleTable::points) {
+  if (samples_where_uneven < samples || samples_where_uneven > SampleTable::points ||
+      !std::has_single_bit(static_cast<unsigned>(samples_where_uneven))) {
     return bad("samples_where_uneven",
-               fmt::format("must be at least samples and at most {}", SampleTable::points));
+               fmt::format("must be a power of two from samples to {}", SampleTable::points));
   }
   if (!(uneven_light >= 0.0)) return bad("uneven_light", "must not be negative");
   return {};
@@ -99,7 +104,7 @@ ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics
     tiles.for_pixels(tile, [&](int x, int y) {
       if (!wanted(x, y)) return;
       sum_of(x, y) = {};
-      for (int i = 0; i < count; ++i) samples.push_back({x, y, i});
+      for (int i = 0; i < count; ++i) samples.push_back({x, y, i, count});
     });
     if (samples.empty()) return;
     ViewTracer tracer(*placed, optics, lamps, lamps_seen, table_angles_deg, options);
@@ -110,7 +115,7 @@ ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics
     }
   };
 
-  const bool lamps_in_turn = options.samples >= 4 && options.samples % 2 == 0;
+  const bool lamps_in_turn = options.samples >= 4;
   parallel_for(tiles.count(), options.threads, [&](int tile) {
     trace_tile(tile, options.samples, lamps_in_turn, [](int, int) { return true; });
   });

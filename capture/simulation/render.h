@@ -48,7 +48,7 @@ class PreparedOptics {
 };
 
 struct RenderOptions {
-  int samples = 4;  ///< per pixel, everywhere; textures are filtered to match
+  int samples = 4;  ///< per pixel, everywhere: a power of two; textures are filtered to match
   /// Per pixel at and beside outlines, the edges of shadows and sharp turns of the surface.
   int samples_where_uneven = 16;
   /// What counts as a sharp turn: (max - min) / (max + min) of the light on the surface.

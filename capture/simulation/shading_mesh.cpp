@@ -1,5 +1,6 @@
 #include "capture/simulation/shading_mesh.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -94,6 +95,12 @@ bool divide_once(Divided& mesh, double longest_edge_mm, std::size_t most_triangl
       }
       if (after >= 0) rim.push_back(after);
     }
+    // The fan around a middle; around a corner beside the only middle, one triangle would be flat
+    // and the other the undivided one.
+    const auto is_middle = [&](int v) {
+      return std::find(middles_of.begin(), middles_of.end(), v) != middles_of.end();
+    };
+    std::rotate(rim.begin(), std::find_if(rim.begin(), rim.end(), is_middle), rim.end());
     for (std::size_t i = 2; i < rim.size(); ++i) {
       triangles.push_back({rim[0], rim[i - 1], rim[i]});
     }

@@ -15,9 +15,20 @@ using Eigen::Vector3d;
 using Eigen::Vector3f;
 
 /// Dimensions of a sample, each with a set of points of its own.
-enum Dimension : std::uint64_t { in_pixel, in_pupil, in_time, on_first_lamp };
+enum Dimension : std::uint64_t { in_pupil, in_time, on_first_lamp };
 
 constexpr float gloss_exponent = 24.0F;
+
+/// Where in its pixel a sample lies: Hammersley's points, the same for all pixels. Their mean is
+/// the pixel's centre and no two share a row or a column, so that edges come out where they are,
+/// in as many steps as there are samples. \pre count is a power of two
+Vector2d place_in_pixel(int index, int count) {
+  int reversed = 0;
+  for (int bit = 1, mirror = count / 2; mirror > 0; bit *= 2, mirror /= 2) {
+    if (index & bit) reversed += mirror;
+  }
+  return {(index + 0.5) / count, (reversed + 0.5) / count};
+}
 
 /// x^24, far cheaper than pow().
 float highlight(float x) {
@@ -71,9 +82,8 @@ ViewTracer::Sight ViewTracer::sight(const PixelSample& sample) const {
   const auto draw = [&](Dimension dimension) -> const Eigen::Vector2f& {
     return scene_.parts->samples.at(mix(sight.pixel_hash, dimension), sample.index);
   };
-  const Eigen::Vector2f& place = draw(in_pixel);
-  const Vector2d chief = optics_.ray(sample.x + static_cast<double>(place.x()),
-                                     sample.y + static_cast<double>(place.y()));
+  const Vector2d place = place_in_pixel(sample.index, sample.count);
+  const Vector2d chief = optics_.ray(sample.x + place.x(), sample.y + place.y());
   Vector3d origin = Vector3d::Zero();
   Vector3d direction = chief.homogeneous();
   if (optics.aperture_mm > 0.0) {
@@ -126,7 +136,10 @@ void ViewTracer::add_lamps(const SurfacePoint& point, const Sight& sight, const 
     const Vector3d direction = to_lamp / distance;
     const double cosine = point.normal.dot(direction);
     const double lamp_cosine = -facing.dot(direction);
-    if (cosine <= 0.0 || lamp_cosine <= 0.0 || point.flat_normal.dot(direction) <= 0.0) continue;
+    if (cosine <= 0.0 || lamp_cosine <= 0.0 || point.flat_normal.dot(direction) <= 0.0) {
+      traced.lamps_behind |= static_cast<std::uint8_t>(1U << i);
+      continue;
+    }
 
     // `strength` is what a white diffuser at the target sends back; from there the light falls
     // off with both cosines and the square of the distance.

@@ -19,13 +19,15 @@ struct TracedSample {
   float light = 0.0F;           ///< on the surface as it is turned, shadows and texture left out
   std::uint8_t lamps_seen = 0;  ///< one bit for each lamp that was looked for and is visible
   std::uint8_t lamps_hidden = 0;
+  std::uint8_t lamps_behind = 0;  ///< those that the surface turns its back to
 };
 
-/// A sample to be traced: which one of which pixel.
+/// A sample to be traced: which one of which pixel, and of how many (a power of two).
 struct PixelSample {
   int x = 0;
   int y = 0;
   int index = 0;
+  int count = 1;
 };
 
 /// Traces samples of one view. One for each thread: it keeps buffers between calls.
