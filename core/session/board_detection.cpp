@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/session/aruco.h"
+#include "core/session/board_homography.h"
 #include "core/session/board_pattern.h"
 #include "core/session/charuco_board.h"
 #include "core/session/corner_fit.h"
@@ -20,106 +21,11 @@ namespace skullstation {
 
 namespace {
 
-using Quad = Eigen::Matrix<double, 4, 2>;
-
 struct SeenMarker {
   BoardMarker marker;
-  Quad board_mm;
-  Quad image_px;
+  Eigen::Matrix<double, 4, 2> board_mm;
+  Eigen::Matrix<double, 4, 2> image_px;
 };
-
-struct Correspondences {
-  std::vector<Eigen::Vector2d> board_mm;
-  std::vector<Eigen::Vector2d> image_px;
-  void add(const Quad& board, const Quad& image) {
-    for (int i = 0; i < 4; ++i) {
-      board_mm.emplace_back(board.row(i).transpose());
-      image_px.emplace_back(image.row(i).transpose());
-    }
-  }
-};
-
-/// px = hnormalized(matrix * ((mm - origin) / scale, 1)).
-struct Homography {
-  Eigen::Matrix3d matrix;
-  Eigen::Vector2d origin_mm;
-  double scale_mm = 1.0;
-
-  Eigen::Vector2d operator()(const Eigen::Vector2d& mm) const {
-    return (matrix * scaled(mm).homogeneous()).hnormalized();
-  }
-  /// d px / d mm.
-  Eigen::Matrix2d jacobian(const Eigen::Vector2d& mm) const {
-    const Eigen::Vector3d h = matrix * scaled(mm).homogeneous();
-    const Eigen::Vector2d px = h.hnormalized();
-    Eigen::Matrix2d j;
-    for (int axis = 0; axis < 2; ++axis) {
-      j.col(axis) = (matrix.col(axis).head<2>() - px * matrix(2, axis)) / (h.z() * scale_mm);
-    }
-    return j;
-  }
-
- private:
-  Eigen::Vector2d scaled(const Eigen::Vector2d& mm) const { return (mm - origin_mm) / scale_mm; }
-};
-
-/// Least squares: affine for fewer than six points (perspective would fit their noise), else the
-/// direct linear transform with normalised points (Hartley 1997). Nothing for points on a line.
-std::optional<Homography> fit_homography(const Correspondences& points) {
-  const auto count = static_cast<Eigen::Index>(points.board_mm.size());
-  if (count < 3) return std::nullopt;
-  Homography h;
-  Eigen::Vector2d image_center = Eigen::Vector2d::Zero();
-  h.origin_mm.setZero();
-  for (Eigen::Index i = 0; i < count; ++i) {
-    h.origin_mm += points.board_mm[i] / static_cast<double>(count);
-    image_center += points.image_px[i] / static_cast<double>(count);
-  }
-  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-  double image_scale = 0.0;
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const Eigen::Vector2d mm = points.board_mm[i] - h.origin_mm;
-    spread += mm * mm.transpose() / static_cast<double>(count);
-    image_scale += (points.image_px[i] - image_center).norm() / static_cast<double>(count);
-  }
-  h.scale_mm = std::sqrt(spread.trace());
-  if (!(spread.determinant() > 1e-4 * h.scale_mm * h.scale_mm * h.scale_mm * h.scale_mm)) {
-    return std::nullopt;
-  }
-  if (!(image_scale > 0.0)) return std::nullopt;
-
-  Eigen::Matrix3d fitted;
-  if (count < 6) {
-    Eigen::MatrixXd a(count, 3);
-    Eigen::MatrixXd b(count, 2);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      a.row(i) = ((points.board_mm[i] - h.origin_mm) / h.scale_mm).homogeneous().transpose();
-      b.row(i) = ((points.image_px[i] - image_center) / image_scale).transpose();
-    }
-    fitted.topRows<2>() = a.colPivHouseholderQr().solve(b).transpose();
-    fitted.row(2) = Eigen::RowVector3d::UnitZ();
-  } else {
-    Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Eigen::Vector3d x = ((points.board_mm[i] - h.origin_mm) / h.scale_mm).homogeneous();
-      const Eigen::Vector2d px = (points.image_px[i] - image_center) / image_scale;
-      Eigen::Matrix<double, 2, 9> rows = Eigen::Matrix<double, 2, 9>::Zero();
-      rows.block<1, 3>(0, 0) = x.transpose();
-      rows.block<1, 3>(0, 6) = -px.x() * x.transpose();
-      rows.block<1, 3>(1, 3) = x.transpose();
-      rows.block<1, 3>(1, 6) = -px.y() * x.transpose();
-      normal += rows.transpose() * rows;
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(normal);
-    const Eigen::Matrix<double, 9, 1> v = solver.eigenvectors().col(0);
-    fitted << v.segment<3>(0).transpose(), v.segment<3>(3).transpose(), v.segment<3>(6).transpose();
-  }
-  Eigen::Matrix3d denormalise;
-  denormalise << image_scale, 0.0, image_center.x(), 0.0, image_scale, image_center.y(), 0.0, 0.0,
-      1.0;
-  h.matrix = denormalise * fitted;
-  return h;
-}
 
 std::vector<SeenMarker> find_markers(const Image8& grey, const CharucoBoard& board) {
   const cv::Mat image(grey.height, grey.width, CV_8UC1,
@@ -214,15 +120,15 @@ std::vector<SeenMarker> consistent_markers(const std::vector<SeenMarker>& seen) 
 class CornerGrid {
  public:
   explicit CornerGrid(const CharucoBoard& board)
-      : board_(board), positions_(static_cast<std::size_t>(board.corner_count())) {}
+      : board_(board), corners_(static_cast<std::size_t>(board.corner_count())) {}
 
   int columns() const { return board_.squares_x - 1; }
   int rows() const { return board_.squares_y - 1; }
   bool inside(int column, int row) const {
     return column >= 0 && row >= 0 && column < columns() && row < rows();
   }
-  std::optional<Eigen::Vector2d>& at(int column, int row) {
-    return positions_[static_cast<std::size_t>(row * columns() + column)];
+  std::optional<FittedCorner>& at(int column, int row) {
+    return corners_[static_cast<std::size_t>(row * columns() + column)];
   }
   Eigen::Vector2d board_mm(int column, int row) const {
     return board_.corner(row * columns() + column).head<2>();
@@ -235,7 +141,7 @@ class CornerGrid {
       for (int x = column - radius; x <= column + radius; ++x) {
         if (!inside(x, y) || (x == column && y == row) || !at(x, y)) continue;
         known.board_mm.push_back(board_mm(x, y));
-        known.image_px.push_back(*at(x, y));
+        known.image_px.push_back(at(x, y)->position_px);
       }
     }
     return known;
@@ -243,7 +149,7 @@ class CornerGrid {
 
  private:
   const CharucoBoard& board_;
-  std::vector<std::optional<Eigen::Vector2d>> positions_;
+  std::vector<std::optional<FittedCorner>> corners_;
 };
 
 /// What every corner's fit needs to know.
@@ -253,8 +159,8 @@ struct Search {
   double ring_mm = 0.0;  ///< the black ring around each marker's bits
 };
 
-std::optional<Eigen::Vector2d> fit_at(const Search& search, int column, int row,
-                                      const Eigen::Vector2d& mm, const Homography& map) {
+std::optional<FittedCorner> fit_at(const Search& search, int column, int row,
+                                   const Eigen::Vector2d& mm, const Homography& map) {
   const CharucoBoard& board = search.board;
   const Image8& grey = search.grey;
   ExpectedCorner expected;
@@ -330,35 +236,83 @@ void grow(const Search& search, CornerGrid& grid) {
   }
 }
 
-/// Removes corners that don't lie where their neighbours say, the worst first.
+/// Removes corners whose picture is much less like a corner's than that of most others: partly
+/// hidden ones, whose position suffers from it.
+void drop_unlike_others(CornerGrid& grid) {
+  constexpr double always_good = 0.02;  // of the variance; leaves every position right
+  constexpr double times_typical = 3.0;
+  std::vector<double> unexplained;
+  for (int row = 0; row < grid.rows(); ++row) {
+    for (int column = 0; column < grid.columns(); ++column) {
+      if (const auto& corner = grid.at(column, row)) unexplained.push_back(corner->unexplained);
+    }
+  }
+  if (unexplained.empty()) return;
+  const auto middle = unexplained.begin() + static_cast<std::ptrdiff_t>(unexplained.size() / 2);
+  std::nth_element(unexplained.begin(), middle, unexplained.end());
+  const double limit = std::max(always_good, times_typical * *middle);
+  for (int row = 0; row < grid.rows(); ++row) {
+    for (int column = 0; column < grid.columns(); ++column) {
+      auto& corner = grid.at(column, row);
+      if (corner && corner->unexplained > limit) corner.reset();
+    }
+  }
+}
+
+/// A corner's distance from where its neighbours say it is.
+struct Departure {
+  std::optional<FittedCorner>* corner = nullptr;
+  double px = 0.0;
+  double allowed_px = 0.0;
+};
+
+/// Departures of all corners; those that no neighbours confirm are removed.
+std::vector<Departure> departures(const CharucoBoard& board, CornerGrid& grid) {
+  // A lens bends the grid by far less than this between neighbours.
+  constexpr double allowed_squares = 0.04;
+  constexpr double allowed_px = 0.4;
+  std::vector<Departure> result;
+  for (int row = 0; row < grid.rows(); ++row) {
+    for (int column = 0; column < grid.columns(); ++column) {
+      auto& corner = grid.at(column, row);
+      if (!corner) continue;
+      const Correspondences known = grid.around(column, row, 2);
+      const auto map = known.board_mm.size() < 4 ? std::nullopt : fit_homography(known);
+      if (!map) {
+        corner.reset();
+        continue;
+      }
+      const Eigen::Vector2d mm = grid.board_mm(column, row);
+      const double square_px =
+          board.square_mm * std::sqrt(std::abs(map->jacobian(mm).determinant()));
+      result.push_back({&corner, ((*map)(mm)-corner->position_px).norm(),
+                        allowed_px + allowed_squares * square_px});
+    }
+  }
+  return result;
+}
+
+/// Removes corners that don't lie where their neighbours say, the worst first: fitted to something
+/// else, or half hidden.
 void drop_inconsistent(const CharucoBoard& board, CornerGrid& grid) {
-  // A lens bends the grid by far less than this between neighbours; a corner fitted to something
-  // else, or half hidden, is off by more.
-  constexpr double tolerance_squares = 0.04;
-  constexpr double tolerance_px = 0.4;
+  constexpr double always_good_px = 0.3;
+  constexpr double times_typical = 6.0;
   while (true) {
+    const std::vector<Departure> all = departures(board, grid);
+    if (all.empty()) return;
+    std::vector<double> sizes;
+    sizes.reserve(all.size());
+    for (const Departure& departure : all) sizes.push_back(departure.px);
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    const double usual_px = std::max(always_good_px, times_typical * *middle);
     double worst = 1.0;
-    std::optional<Eigen::Vector2d>* worst_corner = nullptr;
-    for (int row = 0; row < grid.rows(); ++row) {
-      for (int column = 0; column < grid.columns(); ++column) {
-        auto& corner = grid.at(column, row);
-        if (!corner) continue;
-        const Correspondences known = grid.around(column, row, 2);
-        const auto map = known.board_mm.size() < 4 ? std::nullopt : fit_homography(known);
-        if (!map) {
-          // Nobody confirms it.
-          corner.reset();
-          continue;
-        }
-        const Eigen::Vector2d mm = grid.board_mm(column, row);
-        const double square_px =
-            board.square_mm * std::sqrt(std::abs(map->jacobian(mm).determinant()));
-        const double allowed = tolerance_px + tolerance_squares * square_px;
-        const double off = ((*map)(mm) - *corner).norm() / allowed;
-        if (!(off <= worst)) {
-          worst = off;
-          worst_corner = &corner;
-        }
+    std::optional<FittedCorner>* worst_corner = nullptr;
+    for (const Departure& departure : all) {
+      const double excess = departure.px / std::min(usual_px, departure.allowed_px);
+      if (!(excess <= worst)) {
+        worst = excess;
+        worst_corner = departure.corner;
       }
     }
     if (worst_corner == nullptr) return;
@@ -393,12 +347,13 @@ std::vector<BoardCorner> detect_board(const Image8& image, const CharucoBoard& b
   CornerGrid grid(board);
   seed_from_markers(search, markers, grid);
   grow(search, grid);
+  drop_unlike_others(grid);
   drop_inconsistent(board, grid);
   std::vector<BoardCorner> corners;
   for (int row = 0; row < grid.rows(); ++row) {
     for (int column = 0; column < grid.columns(); ++column) {
       if (const auto& corner = grid.at(column, row)) {
-        corners.push_back({row * grid.columns() + column, *corner});
+        corners.push_back({row * grid.columns() + column, corner->position_px});
       }
     }
   }

@@ -225,12 +225,12 @@ double angle_between(double a, double b) {
 
 }  // namespace
 
-std::optional<Eigen::Vector2d> fit_corner(const Image8& grey, const ExpectedCorner& expected) {
+std::optional<FittedCorner> fit_corner(const Image8& grey, const ExpectedCorner& expected) {
   // Fewer pixels than this (a corner at the image's rim) don't determine nine unknowns well.
   constexpr std::size_t min_pixels = 30;
-  constexpr double min_contrast = 5.0;   // grey levels, half the step from black to white
-  constexpr double min_explained = 0.8;  // of the pixels' variance
-  constexpr double max_turn = 0.35;      // radians, against the expected edges
+  constexpr double min_contrast = 5.0;     // grey levels, half the step from black to white
+  constexpr double max_unexplained = 0.2;  // of the pixels' variance
+  constexpr double max_turn = 0.35;        // radians, against the expected edges
 
   const Eigen::Matrix2d& a = expected.px_from_mm;
   const double expected_u = std::atan2(a(1, 0), a(0, 0));
@@ -247,6 +247,7 @@ std::optional<Eigen::Vector2d> fit_corner(const Image8& grey, const ExpectedCorn
   p[angle_u] = expected_u;
   p[angle_v] = expected_v;
   p[log_blur] = std::log(1.0);
+  double unexplained = 0.0;
   for (int pass = 0; pass < 2; ++pass) {
     const std::vector<Pixel> pixels = cross_pixels(grey, expected, p.head<2>());
     if (pixels.size() < min_pixels) return std::nullopt;
@@ -266,13 +267,14 @@ std::optional<Eigen::Vector2d> fit_corner(const Image8& grey, const ExpectedCorn
     // Negated comparisons also catch what is not a number.
     if (!(shift <= expected.max_shift_px)) return std::nullopt;
     if (!(sign * p[contrast] >= min_contrast)) return std::nullopt;
-    if (!(error <= (1.0 - min_explained) * variance)) return std::nullopt;
+    unexplained = error / variance;
+    if (!(unexplained <= max_unexplained)) return std::nullopt;
     if (angle_between(p[angle_u], expected_u) > max_turn) return std::nullopt;
     if (angle_between(p[angle_v], expected_v) > max_turn) return std::nullopt;
     const double square_px = expected.square_mm * std::sqrt(std::abs(a.determinant()));
     if (!(std::exp(p[log_blur]) < 0.25 * square_px)) return std::nullopt;
   }
-  return Eigen::Vector2d(p[at_x], p[at_y]);
+  return FittedCorner{p.head<2>(), unexplained};
 }
 
 }  // namespace skullstation

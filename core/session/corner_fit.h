@@ -18,11 +18,16 @@ struct ExpectedCorner {
   double max_shift_px = 0.0;  ///< farther from the expected position is another corner
 };
 
+struct FittedCorner {
+  Eigen::Vector2d position_px;
+  double unexplained = 0.0;  ///< share of the pixels' variance that the fitted picture leaves
+};
+
 /// Fits the picture of a chessboard corner to the pixels around the expected position: two
 /// straight edges that cross and the markers' black corners beside them, blurred by a Gaussian,
 /// under light that changes linearly (least squares, Levenberg-Marquardt). Only a cross of pixels
 /// along the edges is used, so that the markers' bits have no say. Nothing where the pixels don't
 /// look like that: a hidden, cut off or washed-out corner.
-std::optional<Eigen::Vector2d> fit_corner(const Image8& grey, const ExpectedCorner& expected);
+std::optional<FittedCorner> fit_corner(const Image8& grey, const ExpectedCorner& expected);
 
 }  // namespace skullstation
