@@ -91,10 +91,10 @@ TEST_F(Calibrate, TableDetectsTwoPercentSlip) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "table.json"));
 }
 
-TEST_F(Calibrate, TableWithoutABoardInViewSaysSo) {
-  ASSERT_EQ(calibrate("camera").exit_code, 0);
-  const auto result = calibrate("table", "[board]\npresent = false\n[simulation.x]\n");
+TEST_F(Calibrate, TableWithoutABoardIsRefused) {
+  const auto result = calibrate("table", "[board]\npresent = false\n");
   EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("board.present"));
 }
 
 TEST_F(Calibrate, TableNeedsACalibratedCamera) {
