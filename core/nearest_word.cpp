@@ -28,7 +28,9 @@ std::string nearest_word(std::string_view mistyped, const std::vector<std::strin
   std::string best;
   std::size_t best_distance = mistyped.size() / 3 + 2;
   for (const std::string& word : known) {
-    const std::size_t distance = edit_distance(mistyped, word);
+    // "backlash" for "backlash_deg": a forgotten unit is one mistake, however long it is.
+    const bool cut_short = mistyped.size() >= 3 && word.starts_with(mistyped);
+    const std::size_t distance = cut_short ? 1 : edit_distance(mistyped, word);
     if (distance < best_distance) {
       best = word;
       best_distance = distance;

@@ -242,14 +242,14 @@ class TomlShower final : public Shower {
   std::string text;
 
   void table(std::string_view key, const std::function<void()>& content) override {
-    section(fmt::format("[{}]", joined(path_, key)), joined(path_, key), content);
+    section(fmt::format("[{}]", heading(key)), joined(path_, key), content);
   }
 
   void tables(std::string_view key, std::size_t count, const std::function<void(std::size_t)>&,
               const std::function<void(std::size_t)>& content) override {
     for (std::size_t i = 0; i < count; ++i) {
-      section(fmt::format("[[{}]]", joined(path_, key)),
-              fmt::format("{}[{}]", joined(path_, key), i), [&] { content(i); });
+      section(fmt::format("[[{}]]", heading(key)), fmt::format("{}[{}]", joined(path_, key), i),
+              [&] { content(i); });
     }
   }
 

@@ -10,6 +10,7 @@ TEST(NearestWord, FindsTheTypo) {
   EXPECT_EQ(nearest_word("exposure_ms", known), "exposure_us");
   EXPECT_EQ(nearest_word("exposure", known), "exposure_us");
   EXPECT_EQ(nearest_word("gian", known), "gain");
+  EXPECT_EQ(nearest_word("white", known), "white_balance_k");
 }
 
 TEST(NearestWord, ProposesNothingFarFetched) {
