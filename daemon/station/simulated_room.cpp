@@ -18,7 +18,7 @@ namespace skullstation {
 namespace {
 
 /// The cameras look at this point of the table's axis: about the middle of a standing skull.
-const Eigen::Vector3d view_target_mm(0.0, 0.0, 75.0);
+const Eigen::Vector3d view_target_mm(0.0, 0.0, 100.0);
 
 /// Streams of random numbers of one seed.
 enum SeedOf : std::uint64_t {

@@ -28,7 +28,7 @@ enum class CameraBackend { simulated, v4l2, libcamera, replay };
 struct SimulatedView {
   double azimuth_deg = -90.0;  ///< -90 looks at the face of a specimen that faces -y
   double elevation_deg = 15.0;
-  double distance_mm = 700.0;        ///< to a point 75 mm above the table, on the axis
+  double distance_mm = 740.0;        ///< to a point 100 mm above the table, on the axis
   double focal_px_per_width = 1.75;  ///< focal length over image width
   double centre_offset_x_px = 7.3;   ///< of the principal point from the image centre
   double centre_offset_y_px = -3.9;
