@@ -254,8 +254,17 @@ class TomlShower final : public Shower {
   }
 
  private:
-  void section(const std::string& heading, std::string path, const std::function<void()>& content) {
-    text += fmt::format("{}{}\n", text.empty() ? "" : "\n", heading);
+  /// The path as a heading names it: within the last entry of an array, without its number.
+  std::string heading(std::string_view key) const {
+    std::string name = joined(path_, key);
+    for (std::size_t open = name.find('['); open != std::string::npos; open = name.find('[')) {
+      name.erase(open, name.find(']', open) - open + 1);
+    }
+    return name;
+  }
+
+  void section(const std::string& title, std::string path, const std::function<void()>& content) {
+    text += fmt::format("{}{}\n", text.empty() ? "" : "\n", title);
     std::swap(path_, path);
     content();
     std::swap(path_, path);
