@@ -107,6 +107,9 @@ void visit_camera(CameraConfig& camera, ConfigFields& fields) {
 
 void visit_gpio(GpioStationConfig& gpio, ConfigFields& fields) {
   fields.field("chip", gpio.chip, "name, label or path; empty: every chip is searched");
+  fields.field("step_pulse_us", gpio.step_pulse, "high time of a step pulse");
+  fields.field("debounce_ms", gpio.button_timing.debounce, "of the button; never of the stop");
+  fields.field("held_after_ms", gpio.button_timing.held_after, "a press this long cancels");
   const auto wire = [&](std::string_view key, GpioWire& w) {
     fields.table(key, [&] {
       fields.field("line", w.name, "as `gpioinfo` lists it; empty: not fitted");
@@ -126,9 +129,6 @@ void visit_gpio(GpioStationConfig& gpio, ConfigFields& fields) {
   wire("red", gpio.red);
   wire("buzzer", gpio.buzzer);
   wire("lights", gpio.lights);
-  fields.field("step_pulse_us", gpio.step_pulse, "high time of a step pulse");
-  fields.field("debounce_ms", gpio.button_timing.debounce, "of the button; never of the stop");
-  fields.field("held_after_ms", gpio.button_timing.held_after, "a press this long cancels");
 }
 
 void visit_simulation(SimulationConfig& simulation, ConfigFields& fields) {
