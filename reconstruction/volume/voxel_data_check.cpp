@@ -134,7 +134,8 @@ Result<void> check_meta_image_data(const fs::path& path) {
   if (data_file.empty()) return bad_file(name, "header", "ElementDataFile is missing");
   double size = static_cast<double>(meta_type_size(header.first_word("ElementType")));
   if (size == 0.0) return bad_file(name, "header", "ElementType is missing or none of a CT");
-  for (const std::string_view word : words_of(header.value("DimSize"))) {
+  const std::string extents = header.value("DimSize");  // the words are views into it
+  for (const std::string_view word : words_of(extents)) {
     int extent = 0;
     if (!parse_number(word, extent) || extent < 1) {
       return bad_file(name, "header", "DimSize is not whole numbers");
