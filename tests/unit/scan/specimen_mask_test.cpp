@@ -121,7 +121,7 @@ TEST(FindSpecimen, OnABoardItIsRightAboutNearlyAllItFinds) {
 }
 
 TEST(FindSpecimen, InFrontOfTheBoardAloneItIsFoundByTheSquaresItHides) {
-  TableView view{60.0, coarse_board, 45.0, 216.0};
+  TableView view{60.0, CharucoBoard{"DICT_5X5_1000", 10, 10, 35.0, 28.0}, 60.0, 216.0};
   const Agreement found = agreement(view);
   EXPECT_GT(found.right, 0.9);
   EXPECT_GT(found.complete, 0.5);
