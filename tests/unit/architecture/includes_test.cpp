@@ -32,6 +32,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"reconstruction/distance", {"core", "reconstruction/io"}},
     {"reconstruction/volume", {"core", "reconstruction/io"}},
     {"reconstruction/phantom", {"core", "reconstruction/io", "reconstruction/volume"}},
+    {"daemon", {"daemon/cli"}},
     {"daemon/station",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
       "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/phantom"}},
