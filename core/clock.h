@@ -4,6 +4,7 @@
 #include <chrono>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 namespace skullstation {
 
@@ -22,7 +23,7 @@ class Clock {
   virtual bool sleep_until(Instant deadline, std::stop_token stop) = 0;
 
   bool sleep_for(std::chrono::nanoseconds duration, std::stop_token stop) {
-    return sleep_until(now() + duration, stop);
+    return sleep_until(now() + duration, std::move(stop));
   }
 };
 
