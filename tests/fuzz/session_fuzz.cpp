@@ -17,6 +17,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto written = skullstation::format_session(*session);
   if (!written) __builtin_trap();
   const auto read = skullstation::parse_session(*written, "session.json");
-  if (!read || skullstation::format_session(*read) != written) __builtin_trap();
+  if (!read) __builtin_trap();
+  const auto again = skullstation::format_session(*read);
+  if (!again || *again != *written) __builtin_trap();
   return 0;
 }

@@ -60,6 +60,7 @@ class GpioSimWorld final : public contract::HardwareWorld {
   std::unique_ptr<GpioSim> chip_ = make_gpio_sim_station();
   std::atomic<long> position_{0};
   std::atomic<long> steps_made_{0};
+  std::atomic<bool> unplugged_{false};
 
   std::mutex mutex_;
   std::condition_variable_any pressed_;
