@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "capture/scan/image_metadata.h"
+#include "capture/scan/scan_setup.h"
 #include "capture/scan/session_recorder.h"
 #include "capture/scan/space_reserve.h"
 #include "core/session/image_file.h"
@@ -15,24 +15,6 @@
 namespace skullstation {
 
 namespace fs = std::filesystem;
-
-Result<void> ScanOptions::validate() const {
-  const auto wrong = [](const char* name, std::string what) {
-    return fail(ErrorKind::usage, fmt::format("scan: {}", name), std::move(what));
-  };
-  if (Result<void> valid = plan.validate(); !valid) return valid;
-  if (Result<void> valid = gates.validate(); !valid) return valid;
-  if (board) {
-    if (Result<void> valid = board->validate(); !valid) return valid;
-  }
-  if (settle_time.count() < 0) return wrong("settle_time", "must not be negative");
-  if (motion_interval.count() < 0) return wrong("motion_interval", "must not be negative");
-  if (frame_timeout.count() <= 0) return wrong("frame_timeout", "must be greater than 0");
-  if (max_attempts < 1 || max_attempts > 100) {
-    return wrong("max_attempts", fmt::format("must be from 1 to 100, not {}", max_attempts));
-  }
-  return {};
-}
 
 namespace {
 
@@ -315,7 +297,7 @@ Result<void> Scan::check_interlock() const {
   const Interlock& interlock = *station_.hardware.interlock;
   if (!interlock.tripped()) return {};
   return fail(ErrorKind::hardware, "interlock", interlock.reason(),
-              "make the station safe, reset it and start the same scan again to go on");
+              "make the station safe and reset it");
 }
 
 Result<void> Scan::sleep_until(Instant deadline) {
@@ -324,8 +306,7 @@ Result<void> Scan::sleep_until(Instant deadline) {
 }
 
 tl::unexpected<Error> Scan::stopped() const {
-  return fail(ErrorKind::cancelled, "scan", "stopped on request",
-              "start the same scan again to go on");
+  return fail(ErrorKind::cancelled, "scan", "stopped on request");
 }
 
 std::vector<double> Scan::accepted_sharpness(const std::string& camera) const {
@@ -338,42 +319,14 @@ std::vector<double> Scan::accepted_sharpness(const std::string& camera) const {
   return values;
 }
 
-/// The session as the options want it, without views; image sizes come from the cameras.
-Session wanted_session(const ScanOptions& options, const ScanStation& station) {
-  Session session;
-  session.created = to_iso8601(station.clock.utc_now());
-  session.station = options.station;
-  session.case_number = options.case_number;
-  session.board = options.board;
-  session.plan = options.plan.record();
-  session.complete = false;
-  for (const ScanCamera& camera : station.cameras) {
-    SessionCamera& entry = session.cameras.emplace_back();
-    entry.id = camera.id;
-    if (camera.lens) entry.params = camera.lens->params(entry.model);
-  }
-  return session;
-}
-
-Result<void> check_cameras(const ScanPlan& plan, const std::vector<ScanCamera>& cameras) {
-  std::set<std::string> ids;
-  for (const ScanCamera& camera : cameras) {
-    if (!ids.insert(camera.id).second) {
-      return fail(ErrorKind::usage, "scan",
-                  fmt::format("two cameras are called \"{}\"", camera.id));
-    }
-  }
-  for (const SessionPlan::Ring& ring : plan.rings) {
-    if (ids.erase(ring.camera) == 0) {
-      return fail(ErrorKind::usage, "scan plan",
-                  fmt::format("the station has no camera \"{}\"", ring.camera));
-    }
-  }
-  if (!ids.empty()) {
-    return fail(ErrorKind::usage, "scan plan",
-                fmt::format("camera \"{}\" has no ring", *ids.begin()));
-  }
-  return {};
+/// Tells whoever reads the error that nothing is lost.
+Error with_way_on(Error error, const SessionRecorder& recorder, int planned) {
+  const std::size_t recorded = recorder.session().views.size();
+  if (recorded == 0) return error;
+  if (!error.advice.empty()) error.advice += "; ";
+  error.advice += fmt::format("{} of {} views are recorded: the same scan started again goes on",
+                              recorded, planned);
+  return error;
 }
 
 }  // namespace
@@ -395,7 +348,9 @@ Result<ScanReport> run_scan(const ScanOptions& options, const ScanStation& stati
   if (!recorder->complete()) {
     StationRest rest(station.hardware);
     Scan scan(options, station, *recorder, progress);
-    if (Result<void> done = scan.run(folder); !done) return forward(done);
+    if (Result<void> done = scan.run(folder); !done) {
+      return tl::unexpected(with_way_on(done.error(), *recorder, report.planned));
+    }
     if (Result<void> resting = rest.enter(); !resting) return forward(resting);
     report.taken = scan.taken();
     report.retries = scan.retries();
