@@ -7,6 +7,7 @@
 
 #include "daemon/cli/commands.h"
 #include "daemon/cli/terminal.h"
+#include "reconstruction/rendering/picture_sheet.h"
 
 namespace {
 
@@ -88,6 +89,20 @@ void add_commands(CLI::App& app, Command& chosen) {
                          [](CLI::App& show, ConfigShowCommand& o) {
                            show.add_option("--config", o.config, config_help);
                          });
+
+  add<PictureCommand>(
+      app, "picture", "draw a mesh from eight sides", chosen,
+      [](CLI::App& picture, PictureCommand& o) {
+        picture.add_option("MESH", o.mesh, "PLY, OBJ or STL, in mm")->required();
+        picture.add_option("--over", o.over, "a mesh to draw see-through over it");
+        picture.add_option("--out", o.out, "PNG file")->required();
+        std::vector<std::string> names;
+        for (const PictureSide& side : head_sides()) names.emplace_back(side.name);
+        picture.add_option("--side", o.side, "one side only")->check(CLI::IsMember(names));
+        picture.add_option("--size", o.size_px, "of each side, in pixels")
+            ->capture_default_str()
+            ->check(CLI::Range(16, 4096));
+      });
 
   add<DoctorCommand>(app, "doctor", "check devices, space and calibration; say what to mend",
                      chosen, [](CLI::App& doctor, DoctorCommand& o) {

@@ -69,6 +69,16 @@ struct ConfigShowCommand {
 };
 Result<CommandReport> run(const ConfigShowCommand&, const CommonOptions&, const Progress&);
 
+/// Draws a mesh [mm, +x left, +y back, +z up] from eight sides, or from one.
+struct PictureCommand {
+  std::filesystem::path mesh;
+  std::filesystem::path over;  ///< a second mesh drawn see-through over the first; empty: none
+  std::filesystem::path out;
+  std::string side;  ///< name of one of head_sides(); empty: all
+  int size_px = 600;
+};
+Result<CommandReport> run(const PictureCommand&, const CommonOptions&, const Progress&);
+
 /// Checks devices, space and calibration, and says what to mend.
 struct DoctorCommand {
   std::filesystem::path config;

@@ -30,16 +30,18 @@ const std::map<std::string, std::set<std::string>> allowed = {
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration"}},
     {"reconstruction/io", {"core"}},
     {"reconstruction/distance", {"core", "reconstruction/io"}},
+    {"reconstruction/rendering", {"core"}},
     {"reconstruction/volume", {"core", "reconstruction/io"}},
     {"reconstruction/phantom", {"core", "reconstruction/io", "reconstruction/volume"}},
-    {"daemon", {"daemon/cli"}},
+    {"daemon", {"daemon/cli", "reconstruction/rendering"}},
     {"daemon/station",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
       "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/phantom"}},
     {"daemon/cli",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
       "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/distance",
-      "reconstruction/volume", "reconstruction/phantom", "daemon/station"}},
+      "reconstruction/rendering", "reconstruction/volume", "reconstruction/phantom",
+      "daemon/station"}},
 };
 
 /// Headers that take seconds to compile: for their own folder only, behind our own plain types.
