@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <cmath>
+#include <span>
 #include <string_view>
 #include <utility>
 
-#include "core/transform.h"
 #include "core/units.h"
 #include "reconstruction/phantom/isosurface.h"
+#include "reconstruction/phantom/largest_component.h"
 #include "reconstruction/phantom/sculpture.h"
 #include "reconstruction/phantom/skull_strokes.h"
 
@@ -20,7 +22,7 @@ namespace {
 constexpr double kGap_mm = 0.4;
 
 /// Centre of the canonical condyles in the midsagittal plane: the hinge of the jaw.
-const Eigen::Vector3d kHinge_mm(0.0, -12.0, -8.0);
+const Eigen::Vector3d kHinge_mm(0.0, -13.0, -5.0);
 
 Stroke stroke_of(const StrokeRow& row) {
   Stroke stroke;
@@ -137,12 +139,12 @@ class ApartSolid final : public ImplicitSolid {
   double gap_mm_;
 };
 
-Rigid3 opened(double opening_deg) {
+}  // namespace
+
+Rigid3 mandible_opening(double opening_deg) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(radians(opening_deg), Eigen::Vector3d::UnitX()));
   return {turn, kHinge_mm - turn * kHinge_mm};
 }
-
-}  // namespace
 
 SkullSolids skull_solids(const SkullShape& shape) {
   assert(shape.mandible_opening_deg >= 0.0 && shape.mandible_opening_deg <= 35.0);
@@ -151,7 +153,7 @@ SkullSolids skull_solids(const SkullShape& shape) {
   skull.cranium = std::make_unique<Sculpture>(sculpt(cranium_strokes(), shape));
   skull.mandible = std::make_unique<ApartSolid>(
       std::make_unique<MovedSolid>(std::make_unique<Sculpture>(sculpt(mandible_strokes(), shape)),
-                                   opened(shape.mandible_opening_deg)),
+                                   mandible_opening(shape.mandible_opening_deg)),
       std::make_unique<Sculpture>(sculpt(cranium_strokes(), shape)), kGap_mm);
   return skull;
 }
@@ -162,7 +164,8 @@ double skull_distance_mm(const SkullSolids& skull, const Eigen::Vector3d& point)
 
 SkullMeshes skull_meshes(const SkullSolids& skull, double edge_mm, int threads) {
   const IsosurfaceOptions options{.cell_mm = edge_mm, .threads = threads};
-  return {isosurface(*skull.cranium, options), isosurface(*skull.mandible, options)};
+  return {largest_component(isosurface(*skull.cranium, options)),
+          largest_component(isosurface(*skull.mandible, options))};
 }
 
 TriangleMesh canonical_skull(double edge_mm, int threads) {

@@ -2,9 +2,9 @@
 
 #include <Eigen/Core>
 #include <memory>
-#include <string>
 #include <vector>
 
+#include "core/transform.h"
 #include "core/triangle_mesh.h"
 #include "reconstruction/phantom/implicit_solid.h"
 
@@ -34,6 +34,9 @@ struct SkullSolids {
 /// \pre the shape's values lie in their ranges
 SkullSolids skull_solids(const SkullShape& shape = {});
 
+/// How the mandible moves from teeth in contact: model_from_closed.
+Rigid3 mandible_opening(double opening_deg);
+
 /// Signed distance [mm] to the bone of the whole skull, negative inside.
 double skull_distance_mm(const SkullSolids& skull, const Eigen::Vector3d& point);
 
@@ -43,7 +46,9 @@ struct SkullMeshes {
 };
 
 /// Closed manifold surfaces with normals, outer and inner surfaces of the bone alike, on a grid of
-/// `edge_mm` in [0.2, 20]. The same bytes for any number of threads (0: all).
+/// `edge_mm` in [0.2, 20], each bone in one piece: pockets sealed inside the bone are filled, which
+/// touches none of the sinuses (they open into the nose). The same bytes for any number of threads
+/// (0: all).
 SkullMeshes skull_meshes(const SkullSolids& skull, double edge_mm, int threads);
 
 /// The canonical skull in one mesh: first the cranium's vertices and triangles, then the

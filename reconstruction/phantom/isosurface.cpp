@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -18,7 +19,8 @@ namespace {
 
 /// Cells along a block's edge. A block owns the grid points at its lower faces, not at its upper
 /// ones, and the edges and cells that start at its points.
-constexpr int kBlock = 8;
+constexpr int kBlockShift = 2;
+constexpr int kBlock = 1 << kBlockShift;
 constexpr int kPoints = kBlock * kBlock * kBlock;
 
 int local_index(const Eigen::Vector3i& in_block) {
@@ -82,10 +84,9 @@ class SparseGrid {
   }
 
   const Block* block_of(const Eigen::Vector3i& grid_point) const {
-    // Rounds towards minus infinity; kBlock is a power of two.
+    // A shift rounds towards minus infinity.
     const Eigen::Vector3i at =
-        Eigen::Vector3i(grid_point.x() >> 3, grid_point.y() >> 3, grid_point.z() >> 3) -
-        first_block_;
+        grid_point.unaryExpr([](int i) { return i >> kBlockShift; }) - first_block_;
     if (at.minCoeff() < 0 || (at.array() >= counts_.array()).any()) return nullptr;
     const int slot = (at.z() * counts_.y() + at.y()) * counts_.x() + at.x();
     return blocks_[static_cast<std::size_t>(slot)].get();
@@ -187,7 +188,7 @@ class SparseGrid {
     }
     TriangleMesh mesh;
     mesh.vertices.resize(static_cast<Eigen::Index>(vertex_count), 3);
-    mesh.normals.resize(static_cast<Eigen::Index>(vertex_count), 3);
+    mesh.normals = Points3::Zero(static_cast<Eigen::Index>(vertex_count), 3);
     mesh.triangles.resize(static_cast<Eigen::Index>(triangle_count), 3);
     Eigen::Index v = 0;
     Eigen::Index f = 0;
@@ -236,7 +237,14 @@ class SparseGrid {
             const Eigen::Vector3d pull = mean - p;
             p += 0.5 * (pull - normal * normal.dot(pull));
           }
-          const auto [distance, gradient] = first_order(*block.solid, p);
+          // Between the first step and the last the normals of the first will do.
+          double distance = 0.0;
+          Eigen::Vector3d gradient = mesh.normals.row(v);
+          if (step == 0 || step == options_.relaxation_steps) {
+            std::tie(distance, gradient) = first_order(*block.solid, p);
+          } else {
+            distance = block.solid->distance_mm(p);
+          }
           const double slope_squared = std::max(gradient.squaredNorm(), 0.25);
           const Eigen::Vector3d newton = -distance / slope_squared * gradient;
           const double limit = 0.5 * options_.cell_mm;

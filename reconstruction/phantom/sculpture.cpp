@@ -45,10 +45,10 @@ double Sculpture::distance_mm(const Eigen::Vector3d& point) const {
   for (const StrokeShape& shape : shapes_) {
     const Stroke& stroke = shape.stroke();
     const bool carve = stroke.tool == Stroke::Tool::carve;
-    // Beyond its reach a stroke changes nothing; the box is much cheaper than the form.
+    // Beyond its reach a stroke changes nothing.
     const double reach_mm = carve ? stroke.blend_mm - distance : stroke.blend_mm + distance;
-    if (shape.lower_bound_mm(point, 0.0) >= reach_mm) continue;
-    const double form = shape.distance_mm(point);
+    const double form = shape.distance_below_mm(point, reach_mm);
+    if (form >= reach_mm) continue;
     distance = carve ? -smooth_minimum(-distance, form, stroke.blend_mm)
                      : smooth_minimum(distance, form, stroke.blend_mm);
   }

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/units.h"
 
 namespace skullstation {
 
 namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Eigen::Vector3d mirrored(const Eigen::Vector3d& point) {
   return {-point.x(), point.y(), point.z()};
@@ -21,6 +24,7 @@ StrokeShape::StrokeShape(const Stroke& stroke)
       inverse_size_(stroke.half_size_mm.cwiseInverse()),
       inverse_size_squared_(inverse_size_.cwiseProduct(inverse_size_)) {
   stroke.half_size_mm.minCoeff(&shortest_axis_);
+  enclosing_radius_mm_ = stroke.half_size_mm.norm();
   const double angle_deg = stroke.rotation_deg.norm();
   if (angle_deg > 0.0) {
     local_from_model_ =
@@ -32,8 +36,11 @@ double StrokeShape::box_distance_mm(const Eigen::Vector3d& local) const {
   return (local.cwiseAbs() - stroke_.half_size_mm).cwiseMax(0.0).norm();
 }
 
-double StrokeShape::one_sided_mm(const Eigen::Vector3d& point) const {
-  const Eigen::Vector3d local = local_from_model_ * (point - stroke_.center_mm);
+double StrokeShape::one_sided_mm(const Eigen::Vector3d& point, double cutoff_mm) const {
+  const Eigen::Vector3d offset = point - stroke_.center_mm;
+  const double clear_mm = cutoff_mm + enclosing_radius_mm_;
+  if (clear_mm <= 0.0 || offset.squaredNorm() >= clear_mm * clear_mm) return kInfinity;
+  const Eigen::Vector3d local = local_from_model_ * offset;
   if (stroke_.form == Stroke::Form::slab) {
     const Eigen::Vector3d q =
         local.cwiseAbs() - stroke_.half_size_mm + Eigen::Vector3d::Constant(stroke_.rounding_mm);
@@ -54,8 +61,18 @@ double StrokeShape::one_sided_mm(const Eigen::Vector3d& point) const {
 }
 
 double StrokeShape::distance_mm(const Eigen::Vector3d& point) const {
-  if (!stroke_.paired) return one_sided_mm(point);
-  return smooth_minimum(one_sided_mm(point), one_sided_mm(mirrored(point)), stroke_.blend_mm);
+  return distance_below_mm(point, kInfinity);
+}
+
+double StrokeShape::distance_below_mm(const Eigen::Vector3d& point, double cutoff_mm) const {
+  if (!stroke_.paired) return one_sided_mm(point, cutoff_mm);
+  // Of two images that blend the nearer one decides how far off the other still matters.
+  const Eigen::Vector3d left(std::abs(point.x()), point.y(), point.z());
+  const Eigen::Vector3d near = stroke_.center_mm.x() < 0.0 ? mirrored(left) : left;
+  const double first = one_sided_mm(near, cutoff_mm + stroke_.blend_mm);
+  const double second = one_sided_mm(mirrored(near), std::min(cutoff_mm, first) + stroke_.blend_mm);
+  if (first == kInfinity && second == kInfinity) return kInfinity;
+  return smooth_minimum(first, second, stroke_.blend_mm);
 }
 
 double StrokeShape::lower_bound_mm(const Eigen::Vector3d& center, double radius_mm) const {

@@ -44,6 +44,10 @@ class StrokeShape {
   /// below the distance to the enclosing box.
   double distance_mm(const Eigen::Vector3d& point) const;
 
+  /// The same, or infinity where the distance is plainly at least `cutoff_mm`: much quicker far
+  /// off.
+  double distance_below_mm(const Eigen::Vector3d& point, double cutoff_mm) const;
+
   /// Lower bound of the distance from any point of the ball to the form.
   double lower_bound_mm(const Eigen::Vector3d& center, double radius_mm) const;
 
@@ -53,7 +57,7 @@ class StrokeShape {
   Eigen::AlignedBox3d bounds() const;
 
  private:
-  double one_sided_mm(const Eigen::Vector3d& point) const;
+  double one_sided_mm(const Eigen::Vector3d& point, double cutoff_mm) const;
   double box_distance_mm(const Eigen::Vector3d& local) const;
 
   Stroke stroke_;
@@ -61,6 +65,7 @@ class StrokeShape {
   Eigen::Vector3d inverse_size_;
   Eigen::Vector3d inverse_size_squared_;
   int shortest_axis_ = 0;
+  double enclosing_radius_mm_ = 0.0;
 };
 
 }  // namespace skullstation
