@@ -12,51 +12,84 @@ using Eigen::Vector3d;
 
 enum class Bone { cranium, mandible };
 
-/// Where to look: the surface point nearest to the seed or, with a direction, the one farthest in
-/// that direction within the ball about the seed.
+/// How a landmark is found from its seed.
+enum class Search {
+  nearest,  ///< the surface point nearest to the seed
+  extreme,  ///< the surface point farthest in the rule's direction within the ball about the seed
+  roof,     ///< from the seed, which lies in the open, straight up to the bone
+  crest,    ///< of the ridge's points farthest in the direction, one for each x, the lowest
+};
+
 struct Rule {
   std::string_view name;
   Bone bone;
   bool bilateral;
+  Search search;
   double seed_mm[3];  ///< on the left side
   double direction[3];
   double radius_mm;
 };
 
+constexpr Search kNearest = Search::nearest;
+constexpr Search kExtreme = Search::extreme;
+
 constexpr Rule kRules[] = {
-    {"glabella", Bone::cranium, false, {0, -83, 42}, {0, -1, 0}, 7},
-    {"nasion", Bone::cranium, false, {0, -84, 31.5}, {0, 0, 0}, 0},
-    {"rhinion", Bone::cranium, false, {0, -99, 14}, {0, -1, 0}, 6},
-    {"acanthion", Bone::cranium, false, {0, -93, -17}, {0, -1, 0}, 5},
-    {"subspinale", Bone::cranium, false, {0, -91, -22}, {0, 0, 0}, 0},
-    {"prosthion", Bone::cranium, false, {0, -96, -27}, {0, 0, 0}, 0},
-    {"bregma", Bone::cranium, false, {0, -10, 117}, {0, 0, 0}, 0},
-    {"vertex", Bone::cranium, false, {0, 10, 118}, {0, 0, 1}, 45},
-    {"lambda", Bone::cranium, false, {0, 99, 57}, {0, 0, 0}, 0},
-    {"opisthocranion", Bone::cranium, false, {0, 100, 45}, {0, 1, 0}, 35},
-    {"inion", Bone::cranium, false, {0, 88, 5}, {0, 0.8, -0.6}, 14},
-    {"opisthion", Bone::cranium, false, {0, 38, -29}, {0, -1, 0}, 7},
-    {"basion", Bone::cranium, false, {0, -3, -20}, {0, 0.4, -1}, 6},
-    {"porion", Bone::cranium, true, {58, 0, 0}, {0, 0, 0}, 0},
-    {"orbitale", Bone::cranium, true, {33, -75, 0}, {0, 0, 0}, 0},
-    {"supraorbitale", Bone::cranium, true, {27, -80, 40}, {0, 0, 0}, 0},
-    {"ectoconchion", Bone::cranium, true, {48, -62, 18}, {0, 0, 0}, 0},
-    {"dacryon", Bone::cranium, true, {11, -76, 26}, {0, 0, 0}, 0},
-    {"frontomalare temporale", Bone::cranium, true, {50, -61, 30}, {1, 0, 0}, 5},
-    {"frontotemporale", Bone::cranium, true, {49, -58, 47}, {0, 0, 0}, 0},
-    {"euryon", Bone::cranium, true, {70, 20, 40}, {1, 0, 0}, 45},
-    {"zygion", Bone::cranium, true, {61, -33, 0}, {1, 0, 0}, 20},
-    {"zygomaxillare", Bone::cranium, true, {44, -64, -18}, {0, 0, -1}, 5},
-    {"alare", Bone::cranium, true, {12, -79, -8}, {0, 0, 0}, 0},
-    {"mastoidale", Bone::cranium, true, {52, 6, -28}, {0, 0, -1}, 10},
-    {"infradentale", Bone::mandible, false, {0, -92, -50}, {0, 0, 0}, 0},
-    {"supramentale", Bone::mandible, false, {0, -90, -57}, {0, 0, 0}, 0},
-    {"pogonion", Bone::mandible, false, {0, -93, -65}, {0, -1, 0}, 5},
-    {"gnathion", Bone::mandible, false, {0, -91, -70}, {0, -0.7, -0.7}, 6},
-    {"menton", Bone::mandible, false, {0, -85, -72}, {0, 0, -1}, 10},
-    {"gonion", Bone::mandible, true, {40, -24, -50}, {0.3, 0.65, -0.7}, 14},
-    {"condylion laterale", Bone::mandible, true, {54, -12, -5}, {1, 0, 0}, 8},
-    {"coronion", Bone::mandible, true, {46, -49, -10}, {0, 0, 1}, 10},
+    // The median plane from the front over the vault to the base.
+    {"glabella", Bone::cranium, false, kExtreme, {0, -83, 42}, {0, -1, 0}, 7},
+    {"nasion", Bone::cranium, false, kNearest, {0, -84, 32}, {}, 0},
+    {"midnasale", Bone::cranium, false, kNearest, {0, -92, 23}, {}, 0},
+    {"rhinion", Bone::cranium, false, kExtreme, {0, -99, 14}, {0, -1, 0}, 6},
+    {"nasospinale", Bone::cranium, false, kNearest, {0, -88, -16}, {}, 0},
+    {"acanthion", Bone::cranium, false, kExtreme, {0, -93, -17}, {0, -1, 0}, 5},
+    {"subspinale", Bone::cranium, false, kNearest, {0, -91, -22}, {}, 0},
+    {"mid-philtrum", Bone::cranium, false, kNearest, {0, -93.5, -24.5}, {}, 0},
+    {"prosthion", Bone::cranium, false, kNearest, {0, -96, -27}, {}, 0},
+    {"bregma", Bone::cranium, false, kNearest, {0, -10, 117}, {}, 0},
+    {"vertex", Bone::cranium, false, kExtreme, {0, 10, 118}, {0, 0, 1}, 45},
+    {"lambda", Bone::cranium, false, kNearest, {0, 99, 57}, {}, 0},
+    {"opisthocranion", Bone::cranium, false, kExtreme, {0, 100, 45}, {0, 1, 0}, 35},
+    {"inion", Bone::cranium, false, kExtreme, {0, 88, 5}, {0, 0.8, -0.6}, 14},
+    {"opisthion", Bone::cranium, false, kExtreme, {0, 38, -29}, {0, -1, 0}, 7},
+    {"basion", Bone::cranium, false, kExtreme, {0, -3, -20}, {0, 0.4, -1}, 6},
+    // The face and the sides of the cranium.
+    {"porion", Bone::cranium, true, Search::roof, {51.57, 0, -6}, {}, 8},
+    {"orbitale", Bone::cranium, true, Search::crest, {33, -73.5, -1}, {0, -0.6, 0.8}, 5},
+    {"supraorbitale", Bone::cranium, true, kNearest, {27, -80, 40}, {}, 0},
+    {"mid-supraorbitale", Bone::cranium, true, kNearest, {31, -79, 40}, {}, 0},
+    {"mid-infraorbitale", Bone::cranium, true, kNearest, {30, -78, -2}, {}, 0},
+    {"ectoconchion", Bone::cranium, true, kNearest, {48, -62, 18}, {}, 0},
+    {"dacryon", Bone::cranium, true, kNearest, {11, -76, 26}, {}, 0},
+    {"nasal root", Bone::cranium, true, kNearest, {4.5, -84, 24}, {}, 0},
+    {"frontomalare anterior", Bone::cranium, true, kNearest, {48, -66, 34}, {}, 0},
+    {"frontomalare temporale", Bone::cranium, true, kExtreme, {50, -61, 33}, {1, 0, 0}, 5},
+    {"frontotemporale", Bone::cranium, true, kNearest, {49, -58, 47}, {}, 0},
+    {"coronale", Bone::cranium, true, kExtreme, {59, -29, 66}, {1, 0, 0}, 8},
+    {"euryon", Bone::cranium, true, kExtreme, {70, 20, 40}, {1, 0, 0}, 45},
+    {"asterion", Bone::cranium, true, kNearest, {59, 45.5, 2}, {}, 0},
+    {"auriculare", Bone::cranium, true, kNearest, {61, -3, 7}, {}, 0},
+    {"zygion", Bone::cranium, true, kExtreme, {61, -33, 0}, {1, 0, 0}, 20},
+    {"jugale", Bone::cranium, true, kNearest, {54, -52, 5}, {}, 0},
+    {"zygoorbitale", Bone::cranium, true, kNearest, {30.5, -76, -1}, {}, 0},
+    {"zygomaxillare", Bone::cranium, true, kExtreme, {44, -64, -18}, {0, 0, -1}, 5},
+    {"alare", Bone::cranium, true, kNearest, {12, -79, -8}, {}, 0},
+    {"alar curvature point", Bone::cranium, true, kNearest, {17, -82, -12}, {}, 0},
+    {"mastoidale", Bone::cranium, true, kExtreme, {52, 6, -28}, {0, 0, -1}, 10},
+    {"supra-canine", Bone::cranium, true, kNearest, {18, -89, -25}, {}, 0},
+    {"supra-M2", Bone::cranium, true, kNearest, {31, -59, -28}, {}, 0},
+    // The mandible.
+    {"infradentale", Bone::mandible, false, kNearest, {0, -92, -50}, {}, 0},
+    {"supramentale", Bone::mandible, false, kNearest, {0, -90, -57}, {}, 0},
+    {"pogonion", Bone::mandible, false, kExtreme, {0, -93, -65}, {0, -1, 0}, 5},
+    {"gnathion", Bone::mandible, false, kExtreme, {0, -91, -70}, {0, -0.7, -0.7}, 6},
+    {"menton", Bone::mandible, false, kExtreme, {0, -85, -72}, {0, 0, -1}, 10},
+    {"infra-canine", Bone::mandible, true, kNearest, {12, -91, -53}, {}, 0},
+    {"infra-M2", Bone::mandible, true, kNearest, {33, -57, -50}, {}, 0},
+    {"mid-mandibular border", Bone::mandible, true, kExtreme, {27, -67, -66}, {0.5, 0, -1}, 5},
+    {"gonion", Bone::mandible, true, kExtreme, {40, -24, -50}, {0.3, 0.65, -0.7}, 14},
+    {"mid-ramus", Bone::mandible, true, kNearest, {48, -38, -30}, {}, 0},
+    {"condylion laterale", Bone::mandible, true, kExtreme, {54, -12, -5}, {1, 0, 0}, 8},
+    {"condylion superius", Bone::mandible, true, kExtreme, {46, -14, -1}, {0, 0, 1}, 7},
+    {"coronion", Bone::mandible, true, kExtreme, {46, -49, -10}, {0, 0, 1}, 10},
 };
 
 /// A surface point near `start` by Newton's method; where it fails to settle, the best seen.
@@ -91,13 +124,20 @@ Vector3d extreme(const ImplicitSolid& solid, const Vector3d& seed, const Vector3
     return (p - seed).norm() <= radius_mm && std::abs(solid.distance_mm(p)) < 1e-3;
   };
   constexpr int kSteps = 4;
+  const double spacing_mm = radius_mm / kSteps;
   Vector3d best = onto_surface(solid, seed);
+  double best_height = allowed(best) ? along.dot(best) : -1e9;
   for (int i = -kSteps; i <= kSteps; ++i) {
     for (int j = -kSteps; j <= kSteps; ++j) {
       for (int k = -kSteps; k <= kSteps; ++k) {
         if (median && i != 0) continue;
-        const Vector3d p = onto_surface(solid, seed + radius_mm / kSteps * Vector3d(i, j, k));
-        if (allowed(p) && along.dot(p) > along.dot(best)) best = p;
+        const Vector3d start = seed + spacing_mm * Vector3d(i, j, k);
+        if (std::abs(solid.distance_mm(start)) > 1.2 * spacing_mm) continue;
+        const Vector3d p = onto_surface(solid, start);
+        if (allowed(p) && along.dot(p) > best_height) {
+          best = p;
+          best_height = along.dot(p);
+        }
       }
     }
   }
@@ -115,20 +155,74 @@ Vector3d extreme(const ImplicitSolid& solid, const Vector3d& seed, const Vector3
   return best;
 }
 
-Vector3d find(const ImplicitSolid& whole, const Rule& rule, double side) {
-  const Vector3d mirror(side, 1.0, 1.0);
-  const Vector3d seed = mirror.cwiseProduct(Vector3d(rule.seed_mm));
-  const Vector3d direction = mirror.cwiseProduct(Vector3d(rule.direction));
+/// Straight up from `start`, which lies in the open, to the bone.
+Vector3d roof_above(const ImplicitSolid& solid, const Vector3d& start, double reach_mm) {
+  constexpr double kStep_mm = 0.05;
+  double open_mm = 0.0;
+  while (open_mm < reach_mm && solid.distance_mm(start + open_mm * Vector3d::UnitZ()) > 0.0) {
+    open_mm += kStep_mm;
+  }
+  double below_mm = open_mm - kStep_mm;
+  for (int halving = 0; halving < 40; ++halving) {
+    const double middle_mm = 0.5 * (below_mm + open_mm);
+    const bool open = solid.distance_mm(start + middle_mm * Vector3d::UnitZ()) > 0.0;
+    (open ? below_mm : open_mm) = middle_mm;
+  }
+  return start + open_mm * Vector3d::UnitZ();
+}
+
+/// In the plane of the seed's x the surface point farthest along `direction` (with no x) that can
+/// be reached from the seed uphill.
+Vector3d crest_at(const ImplicitSolid& solid, const Vector3d& seed, const Vector3d& direction,
+                  double radius_mm) {
+  const Vector3d along = direction.normalized();
+  const Vector3d across = Vector3d::UnitX().cross(along);
+  Vector3d best = seed;
+  double best_height = -radius_mm;
+  constexpr int kSteps = 40;
+  for (int i = -kSteps; i <= kSteps; ++i) {
+    const Vector3d foot = seed + radius_mm * i / kSteps * across;
+    double height = radius_mm;
+    while (height > best_height && solid.distance_mm(foot + height * along) > 0.0) height -= 0.02;
+    if (height > best_height) {
+      best_height = height;
+      best = foot + height * along;
+    }
+  }
+  return best;
+}
+
+Vector3d lowest_of_crest(const ImplicitSolid& solid, const Vector3d& seed,
+                         const Vector3d& direction, double radius_mm) {
+  Vector3d lowest = crest_at(solid, seed, direction, radius_mm);
+  for (double offset_mm = -radius_mm; offset_mm <= radius_mm; offset_mm += 0.5) {
+    const Vector3d foot = seed + offset_mm * Vector3d::UnitX();
+    const Vector3d crest = crest_at(solid, foot, direction, radius_mm);
+    if (crest.z() < lowest.z()) lowest = crest;
+  }
+  return onto_surface(solid, lowest);
+}
+
+/// On the left side or in the median plane.
+Vector3d find(const ImplicitSolid& whole, const Rule& rule) {
+  const Vector3d seed(rule.seed_mm);
+  const Vector3d direction(rule.direction);
   // The search strays a little beyond the ball while it settles on the surface.
   const auto solid = whole.near_ball(seed, rule.radius_mm + 8.0, 4.0);
-  if (direction.norm() == 0.0) return onto_surface(*solid, seed);
-  return extreme(*solid, seed, direction, rule.radius_mm, !rule.bilateral);
+  switch (rule.search) {
+    case Search::nearest: return onto_surface(*solid, seed);
+    case Search::extreme: return extreme(*solid, seed, direction, rule.radius_mm, !rule.bilateral);
+    case Search::roof: return roof_above(*solid, seed, rule.radius_mm);
+    case Search::crest: return lowest_of_crest(*solid, seed, direction, rule.radius_mm);
+  }
+  return seed;
 }
 
 }  // namespace
 
 std::vector<Landmark> canonical_landmarks(const SkullShape& shape) {
-  // The mandible's are found with the jaw closed, where the seeds lie, and move with it.
+  // The mandible's are found with the jaw closed, where the seeds lie, and move with it. Those of
+  // the right side are the left's mirror images, for no landmark lies on a tooth.
   SkullShape closed = shape;
   closed.mandible_opening_deg = 0.0;
   const SkullSolids skull = skull_solids(closed);
@@ -137,10 +231,11 @@ std::vector<Landmark> canonical_landmarks(const SkullShape& shape) {
   for (const Rule& rule : kRules) {
     const bool on_mandible = rule.bone == Bone::mandible;
     const ImplicitSolid& solid = on_mandible ? *skull.mandible : *skull.cranium;
+    const Vector3d left = find(solid, rule);
     const auto add = [&](double side, std::string_view suffix) {
-      const Vector3d found = find(solid, rule, side);
+      const Vector3d point(side * left.x(), left.y(), left.z());
       landmarks.push_back(
-          {std::string(rule.name).append(suffix), on_mandible ? opening * found : found});
+          {std::string(rule.name).append(suffix), on_mandible ? opening * point : point});
     };
     if (rule.bilateral) {
       add(1.0, " left");
