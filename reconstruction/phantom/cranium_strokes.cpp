@@ -341,7 +341,7 @@ constexpr StrokeRow kStrokes[] = {
     {"maxillary sinus", kCarve, kEllipsoid, kPaired, {29.50, -64.00, -10.50}, {9.00, 8.30, 6.50}, {0.00, 0.00, 0.00}, 0.00, 1.00},
     {"frontal sinus", kCarve, kEllipsoid, kPaired, {7.00, -78.00, 36.50}, {5.00, 2.20, 6.50}, {0.00, 0.00, 0.00}, 0.00, 1.00},
     {"frontal sinus", kCarve, kSlab, kPaired, {5.00, -70.50, 29.40}, {1.50, 8.50, 1.50}, {-18.40, 0.00, 0.00}, 1.50, 1.00},
-    {"orbital rim", kAdd, kEllipsoid, kPaired, {33.40, -73.00, -1.64}, {8.00, 2.00, 2.20}, {0.00, 0.00, 12.00}, 0.00, 1.60},
+    {"orbital rim", kAdd, kEllipsoid, kPaired, {33.40, -73.00, -1.57}, {8.00, 2.00, 2.20}, {0.00, 0.00, 12.00}, 0.00, 1.60},
 };
 // clang-format on
 
