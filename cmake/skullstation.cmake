@@ -6,6 +6,7 @@ target_compile_options(skullstation_build_flags INTERFACE
   -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wpedantic
   # The same bytes on every machine: no fused multiply-add chosen by the compiler.
   -ffp-contract=off
+  $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>  # without it ccache can't see into precompiled headers
   $<$<BOOL:${SKULLSTATION_WERROR}>:-Werror>)
 if(SKULLSTATION_SANITIZE)
   target_compile_options(skullstation_build_flags INTERFACE
@@ -24,6 +25,9 @@ function(skullstation_library name)
     PRIVATE ${ARG_PRIVATE})
 endfunction()
 
+# What tests do themselves is quick; what they test is compiled as it ships.
+set(SKULLSTATION_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
+
 # skullstation_test(NAME SOURCES a_test.cpp ... [LINK targets ...] [LABEL unit] [TIMEOUT s])
 # makes the test program NAME and registers each of its tests with CTest under the label.
 function(skullstation_test name)
@@ -35,6 +39,8 @@ function(skullstation_test name)
     set(ARG_TIMEOUT 600)
   endif()
   add_executable(${name} ${ARG_SOURCES})
+  target_compile_options(${name} PRIVATE ${SKULLSTATION_TEST_OPTIONS})
+  target_precompile_headers(${name} REUSE_FROM skullstation_test_words)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} skullstation::test_support GTest::gmock_main)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
     PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})

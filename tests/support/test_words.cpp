@@ -1,0 +1,1 @@
+// Only here to carry the headers that all tests share, compiled beforehand.
