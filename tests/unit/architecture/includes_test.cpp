@@ -31,6 +31,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"reconstruction/io", {"core"}},
     {"reconstruction/distance", {"core", "reconstruction/io"}},
     {"reconstruction/rendering", {"core"}},
+    {"reconstruction/registration", {"core", "reconstruction/distance"}},
     {"reconstruction/volume", {"core", "reconstruction/io"}},
     {"reconstruction/phantom", {"core", "reconstruction/io", "reconstruction/volume"}},
     {"daemon", {"daemon/cli", "reconstruction/rendering"}},
@@ -45,9 +46,9 @@ const std::map<std::string, std::set<std::string>> allowed = {
 };
 
 /// Headers that take seconds to compile: for their own folder only, behind our own plain types.
-const std::vector<std::string> heavy = {"CGAL/", "ceres/", "opencv2/",    "embree3/", "itk",
-                                        "gdcm",  "boost/", "exiv2/",      "gpiod",    "libcamera/",
-                                        "toml",  "CLI/",   "Eigen/Sparse"};
+const std::vector<std::string> heavy = {"CGAL/", "ceres/", "opencv2/",     "embree3/", "itk",
+                                        "gdcm",  "boost/", "exiv2/",       "gpiod",    "libcamera/",
+                                        "toml",  "CLI/",   "Eigen/Sparse", "nanoflann"};
 
 struct Include {
   fs::path file;

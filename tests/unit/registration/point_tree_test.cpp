@@ -1,0 +1,46 @@
+#include "reconstruction/registration/point_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/random.h"
+
+namespace skullstation {
+namespace {
+
+TEST(PointTree, AgreesWithASearchOfAllPoints) {
+  Random random(3);
+  Points3 points(500, 3);
+  for (Eigen::Index i = 0; i < points.size(); ++i) points.data()[i] = random.uniform(-10, 10);
+  const PointTree tree(points);
+  for (int query = 0; query < 50; ++query) {
+    const Eigen::Vector3d at(random.uniform(-12, 12), random.uniform(-12, 12),
+                             random.uniform(-12, 12));
+    const Eigen::VectorXd squares = (points.rowwise() - at.transpose()).rowwise().squaredNorm();
+    Eigen::Index nearest = 0;
+    const double least = squares.minCoeff(&nearest);
+    EXPECT_EQ(tree.nearest(at).index, nearest);
+    EXPECT_DOUBLE_EQ(tree.nearest(at).squared_distance, least);
+    EXPECT_EQ(tree.nearest(at, 0.99 * std::sqrt(least)).index, -1);
+    EXPECT_EQ(tree.nearest(at, 1.01 * std::sqrt(least)).index, nearest);
+
+    const auto within = tree.within(at, 4.0);
+    EXPECT_EQ(within.size(), static_cast<std::size_t>((squares.array() < 16.0).count()));
+    for (std::size_t i = 1; i < within.size(); ++i) {
+      EXPECT_LE(within[i - 1].squared_distance, within[i].squared_distance);
+    }
+    const auto five = tree.nearest(at, 5);
+    ASSERT_EQ(five.size(), 5U);
+    EXPECT_EQ(five[0].index, nearest);
+  }
+}
+
+TEST(PointTree, WithoutPointsNothingIsNear) {
+  const PointTree tree(Points3(0, 3));
+  EXPECT_EQ(tree.nearest(Eigen::Vector3d::Zero()).index, -1);
+  EXPECT_TRUE(tree.within(Eigen::Vector3d::Zero(), 5.0).empty());
+}
+
+}  // namespace
+}  // namespace skullstation
