@@ -5,11 +5,14 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/session/board_homography.h"
+
 namespace skullstation {
 
 namespace {
 
-constexpr int min_corners = 8;  // fewer don't fix a homography well enough
+/// Fewer don't fix a homography well enough to look up squares far from them.
+constexpr std::size_t corners_for_print = 8;
 
 cv::Mat view_of(const Image8& image) {
   // OpenCV has no header over const pixels; the result is only read.
@@ -37,6 +40,24 @@ cv::Matx33d homography(const std::vector<BoardCorner>& corners, const CharucoBoa
   return found.empty() ? cv::Matx33d::zeros() : cv::Matx33d(found);
 }
 
+/// px of the quarter image from mm on the board about a few corners: affine, since perspective
+/// would fit their noise. Nothing for corners (nearly) on a line.
+std::optional<cv::Matx33d> affine_about(const std::vector<BoardCorner>& corners,
+                                        const CharucoBoard& board) {
+  Correspondences points;
+  for (const BoardCorner& corner : corners) {
+    points.board_mm.emplace_back(board.corner(corner.id).head<2>());
+    points.image_px.emplace_back(corner.position_px / ViewRegions::scale -
+                                 Eigen::Vector2d::Constant(0.5));
+  }
+  const auto map = fit_homography(points);
+  if (!map) return std::nullopt;
+  const Eigen::Matrix2d turn = map->jacobian(map->origin_mm);
+  const Eigen::Vector2d shift = (*map)(map->origin_mm) - turn * map->origin_mm;
+  return cv::Matx33d(turn(0, 0), turn(0, 1), shift.x(), turn(1, 0), turn(1, 1), shift.y(), 0.0, 0.0,
+                     1.0);
+}
+
 /// Fills the image of a convex outline given in mm on the board.
 void fill_outline(cv::Mat& mask, const cv::Matx33d& px_from_mm,
                   const std::vector<cv::Point2d>& outline_mm) {
@@ -58,9 +79,9 @@ std::vector<cv::Point2d> board_outline(const CharucoBoard& board) {
   return {{-x, -y}, {x, -y}, {x, y}, {-x, y}};
 }
 
-/// The table as far as it may show around the board.
-std::vector<cv::Point2d> table_outline(const CharucoBoard& board) {
-  const double radius_mm = 1.1 * std::hypot(board.width_mm(), board.height_mm()) / 2.0;
+/// The table as far as it may show around the board, out to so many times its corners' distance.
+std::vector<cv::Point2d> table_outline(const CharucoBoard& board, double reach) {
+  const double radius_mm = reach * std::hypot(board.width_mm(), board.height_mm()) / 2.0;
   std::vector<cv::Point2d> circle;
   for (int i = 0; i < 72; ++i) {
     const double angle = i * CV_2PI / 72.0;
@@ -198,12 +219,20 @@ ViewRegions find_specimen(const Image8& grey, const std::vector<BoardCorner>& co
   cv::Mat board_region = cv::Mat::zeros(size, CV_8UC1);
   cv::Mat table = cv::Mat::zeros(size, CV_8UC1);
   cv::Mat specimen = cv::Mat::zeros(size, CV_8UC1);
-  if (board && corners.size() >= min_corners) {
+  if (board && corners.size() >= corners_for_print) {
     const cv::Matx33d px_from_mm = homography(corners, *board);
     fill_outline(board_region, px_from_mm, board_outline(*board));
-    fill_outline(table, px_from_mm, table_outline(*board));
+    fill_outline(table, px_from_mm, table_outline(*board, 1.1));
     table |= board_region;
     specimen = covered_board(small, *board, px_from_mm, board_region);
+  } else if (board && !corners.empty()) {
+    // Somewhere there are white squares: where is known roughly, or not at all.
+    if (const auto px_from_mm = affine_about(corners, *board)) {
+      fill_outline(board_region, *px_from_mm, board_outline(*board));
+      fill_outline(table, *px_from_mm, table_outline(*board, 1.6));
+    } else {
+      table = 255;
+    }
   }
   // Steps above the backdrop, in grey levels: bone lit by the station's lamps is at 100 or more.
   constexpr double low_step = 20.0;

@@ -21,8 +21,11 @@ struct ViewRegions {
 /// Off the table it is what is brighter than the backdrop (hysteresis, Canny 1986). On the board,
 /// whose white paper is as bright as bone, it is where squares that ought to be black are not:
 /// they are looked up in the print by the homography through the detected corners. The table
-/// around the board, out to a tenth beyond the board's corners, is left out. Without a board the
-/// table must be as dark as the backdrop.
+/// around the board, out to a tenth beyond the board's corners, is left out. Without a board, or
+/// with none of its corners in sight, the table must be as dark as the backdrop.
+///
+/// Fewer than 8 corners say only roughly where the board is. Then nothing on it or near it counts
+/// as specimen, and if they lie on a line nothing at all: white squares must never pass for bone.
 ///
 /// `grey` has 1 channel.
 ViewRegions find_specimen(const Image8& grey, const std::vector<BoardCorner>& corners,

@@ -92,8 +92,7 @@ struct Agreement {
   double found = 0.0;     // part of the frame
 };
 
-Agreement agreement(const TableView& view) {
-  const ViewRegions regions = view.regions();
+Agreement compare(const TableView& view, const ViewRegions& regions) {
   double found = 0.0;
   double truth = 0.0;
   double both = 0.0;
@@ -111,6 +110,8 @@ Agreement agreement(const TableView& view) {
           found / (width * height)};
 }
 
+Agreement agreement(const TableView& view) { return compare(view, view.regions()); }
+
 TEST(FindSpecimen, OnABoardItIsRightAboutNearlyAllItFinds) {
   for (const double elevation_deg : {20.0, 30.0, 50.0}) {
     TableView view{elevation_deg, coarse_board, 75.0};
@@ -125,6 +126,36 @@ TEST(FindSpecimen, InFrontOfTheBoardAloneItIsFoundByTheSquaresItHides) {
   const Agreement found = agreement(view);
   EXPECT_GT(found.right, 0.9);
   EXPECT_GT(found.complete, 0.5);
+}
+
+TEST(FindSpecimen, WithFewCornersInSightNoSquareOfTheBoardPassesForBone) {
+  // A large specimen in front of the board leaves a few markers along its rim.
+  const TableView view{60.0, coarse_board, 60.0, 216.0};
+  const Image8 image = view.render();
+  std::vector<BoardCorner> corners = detect_board(image, coarse_board);
+  ASSERT_GE(corners.size(), 1U);
+  for (std::size_t count = std::min<std::size_t>(corners.size(), 5); count >= 1; --count) {
+    corners.resize(count);
+    EXPECT_GT(compare(view, find_specimen(image, corners, coarse_board)).right, 0.95) << count;
+  }
+}
+
+TEST(FindSpecimen, WhatStandsAboveARoughlyKnownBoardIsFoundThere) {
+  const TableView view{20.0, coarse_board, 75.0, 60.0};
+  const Image8 image = view.render();
+  std::vector<BoardCorner> corners = detect_board(image, coarse_board);
+  ASSERT_GE(corners.size(), 8U);
+  // Four of them, around one square.
+  const auto of_square = [&](const BoardCorner& corner) {
+    const int first = 3 * 6 + 2;
+    return corner.id == first || corner.id == first + 1 || corner.id == first + 6 ||
+           corner.id == first + 7;
+  };
+  std::erase_if(corners, [&](const BoardCorner& corner) { return !of_square(corner); });
+  ASSERT_EQ(corners.size(), 4U);
+  const Agreement found = compare(view, find_specimen(image, corners, coarse_board));
+  EXPECT_GT(found.right, 0.95);
+  EXPECT_GT(found.complete, 0.4);
 }
 
 TEST(FindSpecimen, WithoutABoardItIsWhatIsBrighterThanBackdropAndTable) {
