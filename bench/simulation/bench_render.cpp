@@ -75,7 +75,7 @@ Result<void> run(const Options& options) {
     render.seed = static_cast<std::uint64_t>(view);
     render.threads = options.threads;
     const Seconds start = Seconds::now();
-    const ImageF light = render_radiance(**scene, *prepared, {&angle_deg, 1}, render);
+    const ImageF light = render_radiance(*(*scene)->placed(), *prepared, {&angle_deg, 1}, render);
     const Image8 photograph =
         develop(light, SensorOptions{}, ExposureSettings{}, render.seed, options.threads);
     render_all = render_all + (Seconds::now() - start);

@@ -87,13 +87,12 @@ Result<void> RenderOptions::validate() const {
   return {};
 }
 
-ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics,
+ImageF render_radiance(const PlacedScene& scene, const PreparedOptics& optics,
                        std::span<const double> table_angles_deg, const RenderOptions& options) {
-  const std::shared_ptr<const PlacedScene> placed = scene.placed();
   const Lens& lens = optics.optics().lens;
-  const std::vector<Lamp> lamps = make_lamps(placed->parts->options.lights);
+  const std::vector<Lamp> lamps = make_lamps(scene.parts->options.lights);
   const std::vector<TableMap> lamps_seen = lamps_seen_from_table(
-      *placed, lamps, table_angles_deg[table_angles_deg.size() / 2], options.threads);
+      scene, lamps, table_angles_deg[table_angles_deg.size() / 2], options.threads);
   const Tiles tiles{lens.width, lens.height};
   std::vector<PixelSum> sums(static_cast<std::size_t>(lens.width) * lens.height);
   const auto sum_of = [&](int x, int y) -> PixelSum& {
@@ -107,7 +106,7 @@ ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics
       for (int i = 0; i < count; ++i) samples.push_back({x, y, i, count});
     });
     if (samples.empty()) return;
-    ViewTracer tracer(*placed, optics, lamps, lamps_seen, table_angles_deg, options);
+    ViewTracer tracer(scene, optics, lamps, lamps_seen, table_angles_deg, options);
     std::vector<TracedSample> traced(samples.size());
     tracer.trace(samples, lamps_in_turn, traced);
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -162,14 +161,13 @@ ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics
   return image;
 }
 
-ViewTruth render_truth(const SimulatedScene& scene, const PreparedOptics& optics,
+ViewTruth render_truth(const PlacedScene& scene, const PreparedOptics& optics,
                        double table_angle_deg, int threads) {
-  const std::shared_ptr<const PlacedScene> placed = scene.placed();
   const Lens& lens = optics.optics().lens;
   const Rigid3 table_from_camera =
       (optics.optics().camera_from_station * rotation_about_z(table_angle_deg)).inverse();
-  const bool specimen = placed->table_from_specimen.has_value();
-  const Rigid3 specimen_from_table = specimen ? placed->table_from_specimen->inverse() : Rigid3{};
+  const bool specimen = scene.table_from_specimen.has_value();
+  const Rigid3 specimen_from_table = specimen ? scene.table_from_specimen->inverse() : Rigid3{};
   ViewTruth truth{ImageF(lens.width, lens.height, 1), Image8(lens.width, lens.height, 1)};
   parallel_for(lens.height, threads, [&](int y) {
     std::vector<SpecimenRay> rays;
@@ -179,13 +177,13 @@ ViewTruth render_truth(const SimulatedScene& scene, const PreparedOptics& optics
       SightRay ray;
       ray.origin = table_from_camera.translation;
       ray.direction = table_from_camera.rotation * along.normalized();
-      points.push_back(hit_table(*placed, ray));
+      points.push_back(hit_table(scene, ray));
       rays.push_back({specimen_from_table * ray.origin,
                       specimen_from_table.rotation * ray.direction,
                       std::min(points.back().distance_mm, 1e6)});
     }
     std::vector<SpecimenHit> hits(rays.size());
-    if (specimen) placed->parts->surface->intersect(rays, hits);
+    if (specimen) scene.parts->surface->intersect(rays, hits);
     for (int x = 0; x < lens.width; ++x) {
       SceneObject object = points[x].object;
       double distance = points[x].distance_mm;

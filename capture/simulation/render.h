@@ -53,7 +53,7 @@ struct RenderOptions {
   int samples_where_uneven = 16;
   /// What counts as a sharp turn: (max - min) / (max + min) of the light on the surface.
   double uneven_light = 0.2;
-  std::uint64_t seed = 1;  ///< of the sampling pattern; change it for every frame
+  std::uint64_t seed = 1;  ///< of the sampling pattern; change it for every view
   int threads = 0;
 
   Result<void> validate() const;
@@ -68,7 +68,7 @@ struct RenderOptions {
 /// the triangle found is then solved in double precision, so that edges lie within about 0.001 px
 /// of their true place. The samples' pattern is fixed by the seed: same bytes for any number of
 /// threads.
-ImageF render_radiance(const SimulatedScene& scene, const PreparedOptics& optics,
+ImageF render_radiance(const PlacedScene& scene, const PreparedOptics& optics,
                        std::span<const double> table_angles_deg, const RenderOptions& options);
 
 /// Exact truth for one view: along the ray through each pixel's centre from the centre of the
@@ -77,7 +77,7 @@ struct ViewTruth {
   ImageF depth_mm;  ///< z in the camera frame; 0 where there is only the backdrop
   Image8 object;    ///< SceneObject
 };
-ViewTruth render_truth(const SimulatedScene& scene, const PreparedOptics& optics,
+ViewTruth render_truth(const PlacedScene& scene, const PreparedOptics& optics,
                        double table_angle_deg, int threads);
 
 }  // namespace skullstation

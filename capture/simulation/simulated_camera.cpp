@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "capture/cameras/camera_settings.h"
 #include "core/random.h"
 
 namespace skullstation {
@@ -54,6 +55,19 @@ std::int64_t focus_absolute(double distance_mm) {
 
 bool is_nth(std::int64_t count, const std::optional<int>& n) { return n && count % *n == 0; }
 
+/// The table's angles during an exposure, in whole millionths of a degree: far finer than any
+/// picture shows, and the same for every exposure of a table at rest.
+using ExposureAngles = std::array<std::int64_t, angles_per_exposure>;
+constexpr double angle_step_deg = 1e-6;
+
+/// The light of the exposure rendered last, and all that it depends on.
+struct RenderedLight {
+  std::shared_ptr<const PlacedScene> scene;
+  double focus_distance_mm = 0.0;
+  ExposureAngles angles{};
+  ImageF radiance;
+};
+
 }  // namespace
 
 Result<void> SimulatedCameraOptions::validate() const {
@@ -95,6 +109,7 @@ struct SimulatedCamera::State {
   std::int64_t next_sequence = 0;  ///< frames before it were handed out or missed
   std::int64_t requests = 0;
   std::int64_t handed_out = 0;  ///< since it was first opened
+  RenderedLight rendered = {};
 
   std::string path() const { return "simulated:" + options.serial; }
   tl::unexpected<Error> hardware(const std::string& what, const std::string& advice) const {
@@ -124,24 +139,47 @@ struct SimulatedCamera::State {
     return hardware("is unplugged", "check its cable, then open it again");
   }
 
-  Frame photograph(std::int64_t sequence) const;
+  /// Noise-free light on the sensor. Table, scene and focus mostly stand still from one frame to
+  /// the next; then it is the last frame's. The samples' pattern depends on the angle, not on the
+  /// frame, so that what was rendered before is what would be rendered now.
+  const ImageF& light(const ExposureAngles& angles);
+  Frame photograph(std::int64_t sequence);
 };
 
-Frame SimulatedCamera::State::photograph(std::int64_t sequence) const {
-  const Instant start = exposure_start(sequence);
+const ImageF& SimulatedCamera::State::light(const ExposureAngles& angles) {
+  std::shared_ptr<const PlacedScene> placed = scene->placed();
+  const double focus_distance_mm = optics.optics().focus_distance_mm;
+  if (rendered.scene == placed && rendered.focus_distance_mm == focus_distance_mm &&
+      rendered.angles == angles) {
+    return rendered.radiance;
+  }
   std::array<double, angles_per_exposure> angles_deg{};
-  for (int i = 0; i < angles_per_exposure; ++i) {
-    angles_deg[static_cast<std::size_t>(i)] = true_table_angle_deg(
-        start + nanoseconds(settings.exposure) * i / (angles_per_exposure - 1));
-  }
+  std::ranges::transform(angles, angles_deg.begin(), [](std::int64_t steps) {
+    return static_cast<double>(steps) * angle_step_deg;
+  });
   RenderOptions render = options.render;
-  render.seed = mix(options.render.seed, static_cast<std::uint64_t>(sequence));
-  ImageF light = render_radiance(*scene, optics, angles_deg, render);
+  render.seed = mix(options.render.seed, static_cast<std::uint64_t>(angles.front()));
+  ImageF radiance = render_radiance(*placed, optics, angles_deg, render);
   if (options.faults.overexposed) {
-    for (float& value : light.pixels) value *= overexposure;
+    for (float& value : radiance.pixels) value *= overexposure;
   }
+  rendered = {std::move(placed), focus_distance_mm, angles, std::move(radiance)};
+  return rendered.radiance;
+}
+
+Frame SimulatedCamera::State::photograph(std::int64_t sequence) {
+  const Instant start = exposure_start(sequence);
+  ExposureAngles angles{};
+  for (int i = 0; i < angles_per_exposure; ++i) {
+    const double angle_deg = true_table_angle_deg(start + nanoseconds(settings.exposure) * i /
+                                                              (angles_per_exposure - 1));
+    angles[static_cast<std::size_t>(i)] = std::llround(angle_deg / angle_step_deg);
+  }
+  const std::uint64_t noise_seed =
+      mix(mix(options.render.seed, static_cast<std::uint64_t>(sequence)), 1);
   Frame frame;
-  frame.image = develop(light, options.sensor, settings, mix(render.seed, 1), render.threads);
+  frame.image =
+      develop(light(angles), options.sensor, settings, noise_seed, options.render.threads);
   frame.exposure_start = start;
   frame.sequence = static_cast<std::uint32_t>(sequence);
   frame.exposure = settings.exposure;
@@ -242,6 +280,7 @@ Result<std::vector<CameraControl>> SimulatedCamera::controls() {
 
 Result<std::vector<LockedSetting>> SimulatedCamera::lock(const CameraSettings& settings) {
   State& s = *state_;
+  if (const auto sound = check_settings(settings); !sound) return forward(sound);
   if (!s.streaming) return s.unplugged();
   std::vector<LockedSetting> locked;
   const auto set = [&](const ControlRange& range, std::int64_t asked) {

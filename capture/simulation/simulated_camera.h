@@ -17,21 +17,21 @@ namespace skullstation {
 
 /// What can go wrong with a simulated camera, switched on one by one.
 struct SimulatedCameraFaults {
-  bool dead = false;                          ///< not there when it is opened
-  std::optional<int> unplugged_after_frames;  ///< frames handed out until the cable comes off
-  bool silent = false;                        ///< streams, yet no frame ever arrives
-  std::optional<int> times_out_every_nth;     ///< requests for a frame that time out: n, 2n, ...
-  std::optional<int> drops_every_nth;         ///< frames lost on the bus; the next one is good
-  std::optional<int> corrupt_every_nth;       ///< frames that the device flags as damaged
-  bool overexposed = false;                   ///< a stop and a half more light than the lamps give
-  bool ignores_exposure = false;              ///< keeps its default exposure, and says so
+  bool dead = false;                               ///< not there when it is opened
+  std::optional<int> unplugged_after_frames = {};  ///< frames handed out until the cable comes off
+  bool silent = false;                             ///< streams, yet no frame ever arrives
+  std::optional<int> times_out_every_nth = {};  ///< requests for a frame that time out: n, 2n, ...
+  std::optional<int> drops_every_nth = {};      ///< frames lost on the bus; the next one is good
+  std::optional<int> corrupt_every_nth = {};    ///< frames that the device flags as damaged
+  bool overexposed = false;       ///< a stop and a half more light than the lamps give
+  bool ignores_exposure = false;  ///< keeps its default exposure, and says so
 };
 
 struct SimulatedCameraOptions {
   std::string serial = "SIM-1";
   CameraOptics optics;
   SensorOptions sensor;
-  RenderOptions render;                            ///< its seed is mixed with the frame's number
+  RenderOptions render;                            ///< its seed is also that of the noise
   std::chrono::microseconds frame_period{66'667};  ///< between the beginnings of two exposures
   std::chrono::microseconds default_exposure{8000};
   SimulatedCameraFaults faults;
@@ -41,8 +41,12 @@ struct SimulatedCameraOptions {
 
 /// A camera that looks at a SimulatedScene: a product part, used by the demo, by `--simulate` and
 /// by the tests. It streams like a real one, one exposure every frame period on the given clock,
-/// but only frames that are asked for are rendered. With a SimulatedClock, waiting for a frame
+/// but only frames that are asked for are rendered, and only the noise is drawn anew while the
+/// table, the scene and the focus stay as they are. With a SimulatedClock, waiting for a frame
 /// takes the clock to the end of that frame's exposure and readout.
+///
+/// A frame's pixels follow from the options, the settings in force, the scene, the table's angles
+/// during the exposure and the frame's number alone.
 class SimulatedCamera final : public Camera {
  public:
   /// `true_table_angle_deg` tells where the platter really is at a moment that has passed
