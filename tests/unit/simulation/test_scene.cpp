@@ -98,6 +98,14 @@ SceneOptions plain_room() {
   return options;
 }
 
+SceneOptions even_room() {
+  SceneOptions options = plain_room();
+  options.lights.clear();
+  options.ambient = 0.6;
+  options.ambient_rays = 64;
+  return options;
+}
+
 SceneOptions board_room() {
   SceneOptions options = plain_room();
   options.board = CharucoBoard{"DICT_5X5_1000", 7, 7, 50.0, 38.0};

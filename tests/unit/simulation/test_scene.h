@@ -23,6 +23,10 @@ TriangleMesh painted(TriangleMesh mesh, const Eigen::Vector3i& srgb);
 /// ambient light or gloss: its light is a smooth function of the place.
 SceneOptions plain_room();
 
+/// Sky light alone: every upright wall has the same light everywhere, so that a picture's steps are
+/// outlines and nothing else.
+SceneOptions even_room();
+
 /// As plain_room(), with a board of 7 x 7 large squares on the platter.
 SceneOptions board_room();
 
