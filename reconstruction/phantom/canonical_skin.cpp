@@ -19,8 +19,7 @@ std::unique_ptr<ImplicitSolid> skin_solid() {
 }
 
 TriangleMesh canonical_skin(double edge_mm, int threads) {
-  return largest_component(
-      isosurface(*skin_solid(), {.cell_mm = edge_mm, .threads = threads}));
+  return largest_component(isosurface(*skin_solid(), {.cell_mm = edge_mm, .threads = threads}));
 }
 
 }  // namespace skullstation
