@@ -28,10 +28,12 @@ endfunction()
 # What tests do themselves is quick; what they test is compiled as it ships.
 set(SKULLSTATION_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 
-# skullstation_test(NAME SOURCES a_test.cpp ... [LINK targets ...] [LABEL unit] [TIMEOUT s])
-# makes the test program NAME and registers each of its tests with CTest under the label.
+# skullstation_test(NAME SOURCES a_test.cpp ... [LINK targets ...] [LABEL unit] [TIMEOUT s]
+#                   [ONE_PROCESS])
+# makes the test program NAME and registers each of its tests with CTest under the label, or with
+# ONE_PROCESS the program as a whole: for tests that share something dear to make.
 function(skullstation_test name)
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "ONE_PROCESS" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
@@ -42,6 +44,11 @@ function(skullstation_test name)
   target_compile_options(${name} PRIVATE ${SKULLSTATION_TEST_OPTIONS})
   target_precompile_headers(${name} REUSE_FROM skullstation_test_words)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} skullstation::test_support GTest::gmock_main)
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-    PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+  if(ARG_ONE_PROCESS)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+  else()
+    gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
+      PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+  endif()
 endfunction()
