@@ -1,0 +1,97 @@
+#include "reconstruction/volume/opening_seal.h"
+
+#include <functional>
+#include <limits>
+#include <queue>
+#include <utility>
+
+#include "reconstruction/volume/morphology.h"
+
+namespace skullstation {
+
+namespace {
+
+constexpr float unreached = std::numeric_limits<float>::infinity();
+constexpr int wall_voxels = 3;
+
+/// Calls `work(index, step_mm)` for the 26 neighbours inside the grid.
+template <class Work>
+void for_neighbors(const VoxelMask& mask, std::size_t index, const Eigen::Vector3d& spacing_mm,
+                   const Work& work) {
+  const auto width = static_cast<std::size_t>(mask.size.x());
+  const auto height = static_cast<std::size_t>(mask.size.y());
+  const Eigen::Vector3i at(static_cast<int>(index % width),
+                           static_cast<int>(index / width % height),
+                           static_cast<int>(index / width / height));
+  for (int n = 0; n < 27; ++n) {
+    const Eigen::Vector3i step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    const Eigen::Vector3i next = at + step;
+    if (n == 13 || (next.array() < 0).any() || (next.array() >= mask.size.array()).any()) continue;
+    work(mask.index(next.x(), next.y(), next.z()),
+         step.cast<double>().cwiseProduct(spacing_mm).norm());
+  }
+}
+
+/// Way through the air [mm] from the `outer` air to every voxel of air, by the 26 neighbours
+/// (Dijkstra 1959), as far as `depth_mm`.
+std::vector<float> depth_below(const VoxelMask& outer, const VoxelMask& solid,
+                               const Eigen::Vector3d& spacing_mm, double depth_mm) {
+  using Entry = std::pair<float, std::size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  std::vector<float> depth(solid.on.size(), unreached);
+  const auto spread = [&](std::size_t from) {
+    for_neighbors(solid, from, spacing_mm, [&](std::size_t next, double step_mm) {
+      const float way = depth[from] + static_cast<float>(step_mm);
+      if (solid.on[next] != 0 || way > depth_mm || way >= depth[next]) return;
+      depth[next] = way;
+      open.push({way, next});
+    });
+  };
+  for (std::size_t v = 0; v < depth.size(); ++v) {
+    if (outer.on[v] != 0) depth[v] = 0.0F;
+  }
+  for (std::size_t v = 0; v < depth.size(); ++v) {
+    if (outer.on[v] != 0) spread(v);
+  }
+  while (!open.empty()) {
+    const auto [way, at] = open.top();
+    open.pop();
+    if (way == depth[at]) spread(at);
+  }
+  return depth;
+}
+
+}  // namespace
+
+VoxelMask sealed_from_outside(const VoxelMask& solid, const Eigen::Vector3d& spacing_mm,
+                              const OpeningSealOptions& options, int threads) {
+  const VoxelMask grown = dilated(solid, options.closing_radius_mm, spacing_mm, threads);
+  const VoxelMask closed = eroded(grown, options.closing_radius_mm, spacing_mm, threads);
+  const VoxelMask outer = reachable_from_outside(closed);
+  const auto depth = depth_below(outer, solid, spacing_mm, options.depth_mm);
+
+  VoxelMask sealed(solid.size);
+  enum : std::uint8_t { unknown, entered, blocked };
+  std::vector<std::uint8_t> answer(solid.on.size(), unknown);
+  std::vector<std::size_t> front;
+  for (std::size_t v = 0; v < answer.size(); ++v) {
+    if (solid.on[v] != 0) continue;
+    answer[v] = depth[v] == unreached ? blocked : entered;
+    front.push_back(v);
+  }
+  for (int round = 0; round < wall_voxels; ++round) {
+    std::vector<std::size_t> next_front;
+    for (const std::size_t v : front) {
+      for_neighbors(solid, v, spacing_mm, [&](std::size_t next, double) {
+        if (answer[next] != unknown) return;
+        answer[next] = answer[v];
+        next_front.push_back(next);
+      });
+    }
+    front = std::move(next_front);
+  }
+  for (std::size_t v = 0; v < answer.size(); ++v) sealed.on[v] = answer[v] == entered ? 0 : 1;
+  return sealed;
+}
+
+}  // namespace skullstation
