@@ -3,7 +3,9 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <memory>
+#include <string>
 
 #include "daemon/cli/commands.h"
 #include "daemon/cli/terminal.h"
@@ -31,6 +33,19 @@ void add(CLI::App& parent, const std::string& name, const std::string& help, Com
 }
 
 constexpr const char* config_help = "station.toml; without it: a simulated station, all defaults";
+
+void add_surface_options(CLI::App& app, CtSurfaceOptions& o) {
+  app.add_option("--skin-hu", o.skin_hu, "threshold of the skin")->capture_default_str();
+  app.add_option("--bone-hu", o.bone_hu, "threshold of the bone")->capture_default_str();
+  app.add_option("--metal-hu", o.metal_hu, "threshold of metal")->capture_default_str();
+  app.add_option("--edge-mm", o.decimation.edge_mm, "mean edge length")->capture_default_str();
+  app.add_option("--max-error-mm", o.decimation.max_error_mm,
+                 "how far thinning may move the surface")
+      ->capture_default_str();
+  app.add_flag("--no-crop{false}", o.crop, "keep what lies below the mandible");
+  app.add_option("--crop-below-mandible-mm", o.crop_below_mandible_mm, "where the volume is cut")
+      ->capture_default_str();
+}
 
 void add_commands(CLI::App& app, Command& chosen) {
   add<DemoCommand>(app, "demo", "the whole main job on a simulated station", chosen,
@@ -102,6 +117,52 @@ void add_commands(CLI::App& app, Command& chosen) {
         picture.add_option("--size", o.size_px, "of each side, in pixels")
             ->capture_default_str()
             ->check(CLI::Range(16, 4096));
+      });
+
+  add<CompareCommand>(
+      app, "compare", "distances between two surfaces, both ways", chosen,
+      [](CLI::App& compare, CompareCommand& o) {
+        compare.add_option("A", o.a, "PLY, OBJ or STL, in mm")->required();
+        compare.add_option("B", o.b, "what A is compared with")->required();
+        compare.add_option("--align", o.align, "how A may be moved to B first")
+            ->transform(CLI::CheckedTransformer(
+                std::map<std::string, Alignment>{{"none", Alignment::none},
+                                                 {"rigid", Alignment::rigid},
+                                                 {"similarity", Alignment::similarity}}));
+        compare.add_option("--region", o.region,
+                           "text file with the numbers of A's vertices that count, one a line");
+        compare.add_option("--out", o.out, "write A, moved and coloured by distance (.ply, .glb)");
+        compare.add_option("--full-color-mm", o.full_color_mm, "distance of the full colour")
+            ->capture_default_str()
+            ->check(CLI::PositiveNumber);
+      });
+
+  CLI::App* ct = app.add_subcommand("ct", "CT scans for model generation");
+  ct->require_subcommand(1);
+  add<CtImportCommand>(
+      *ct, "import", "bone and skin surfaces of a head, with a quality report", chosen,
+      [](CLI::App& ct_import, CtImportCommand& o) {
+        ct_import
+            .add_option("SCAN", o.input, "DICOM folder or file, .nii, .nii.gz, .nrrd, .mha, .mhd")
+            ->required();
+        ct_import.add_option("--out", o.out, "the subject's new folder")->required();
+        ct_import.add_option("--series", o.read.series,
+                             "which series of the folder: its UID, number or description");
+        ct_import.add_flag("--keep-identity", o.read.keep_identity,
+                           "keep patient name, ID and dates (dropped otherwise)");
+        ct_import
+            .add_option("--length-unit", o.read.length_unit,
+                        "mm, m or um, where the file states none or a wrong one")
+            ->transform(CLI::CheckedTransformer(
+                std::map<std::string, LengthUnit>{{"mm", LengthUnit::millimetre},
+                                                  {"m", LengthUnit::metre},
+                                                  {"um", LengthUnit::micrometre}}));
+        ct_import.add_flag("--assume-patient-axes", o.read.assume_patient_axes,
+                           "for files without orientation: axes run left, posterior, superior");
+        ct_import.add_option("--hu-offset", o.read.hu_offset, "added to every value");
+        ct_import.add_flag("--infer-hu-offset", o.read.infer_hu_offset,
+                           "find that offset by the air round the head");
+        add_surface_options(ct_import, o.surfaces);
       });
 
   add<DoctorCommand>(app, "doctor", "check devices, space and calibration; say what to mend",

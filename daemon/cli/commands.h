@@ -6,6 +6,9 @@
 #include "core/progress.h"
 #include "core/result.h"
 #include "daemon/cli/terminal.h"
+#include "reconstruction/distance/comparison.h"
+#include "reconstruction/volume/ct_surfaces.h"
+#include "reconstruction/volume/volume_options.h"
 
 namespace skullstation {
 
@@ -84,5 +87,25 @@ struct DoctorCommand {
   std::filesystem::path config;
 };
 Result<CommandReport> run(const DoctorCommand&, const CommonOptions&, const Progress&);
+
+/// Bone and skin surfaces of a head from its CT, as a subject's folder.
+struct CtImportCommand {
+  std::filesystem::path input;  ///< DICOM folder or file, NIfTI, NRRD, MetaImage
+  std::filesystem::path out;    ///< the subject's folder; must not exist yet
+  VolumeReadOptions read;
+  CtSurfaceOptions surfaces;
+};
+Result<CommandReport> run(const CtImportCommand&, const CommonOptions&, const Progress&);
+
+/// Distances between two surfaces, both ways.
+struct CompareCommand {
+  std::filesystem::path a;
+  std::filesystem::path b;
+  Alignment align = Alignment::none;  ///< how A may be moved to B first
+  std::filesystem::path region;  ///< vertices of A that count; empty: all
+  std::filesystem::path out;     ///< A, moved and coloured by distance; empty: not written
+  double full_color_mm = 2.0;    ///< distance at which the colour is full
+};
+Result<CommandReport> run(const CompareCommand&, const CommonOptions&, const Progress&);
 
 }  // namespace skullstation

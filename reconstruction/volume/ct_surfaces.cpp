@@ -164,6 +164,9 @@ void thin(CtSurfaces& surfaces, const CtSurfaceOptions& options) {
     (which == 0 ? quality.skull_components : quality.skin_components) = topology.components;
     (which == 0 ? quality.skull_closed_manifold : quality.skin_closed_manifold) =
         topology.is_closed_manifold();
+    if (which == 0) {
+      quality.skull_openings = topology.components - topology.euler_characteristic / 2;
+    }
   });
 }
 
@@ -212,16 +215,15 @@ Result<CtSurfaces> extract_ct_surfaces(Volume volume, const CtSurfaceOptions& op
   SkinField skin = skin_field(
       work.volume, work.coarse, work.head.head, work.streaks,
       {options.skin_hu, options.metal_hu, options.longest_spike_mm, options.seal}, options.threads);
-  surfaces.skin = isosurface(work.volume.grid, skin.hu, options.skin_hu - 0.5, options.threads);
+  surfaces.skin = largest_component(
+      isosurface(work.volume.grid, skin.hu, options.skin_hu - 0.5, options.threads));
   skin.hu = {};
   if (stopped()) return cancelled();
 
   add_findings(work.volume, skin.solid, work.mandible.has_value(), work.canal.has_value(),
                work.quality);
   surfaces.quality = std::move(work.quality);
-  surfaces.grid = work.volume.grid;
-  surfaces.skull_voxels = std::move(work.skull);
-  surfaces.head_voxels = std::move(skin.solid);
+  surfaces.volume = std::move(work.volume);
   progress.report(0.7, "thinning the surfaces");
   thin(surfaces, options);
   if (!surfaces.quality.skull_closed_manifold || !surfaces.quality.skin_closed_manifold) {

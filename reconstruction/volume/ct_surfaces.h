@@ -68,6 +68,8 @@ struct CtQuality {
   double contact_front_mm2 = 0.0;
   double contact_back_mm2 = 0.0;
   int skull_components = 0;  ///< of the mesh
+  /// Openings through the bone surface (its genus): foramina, and walls too thin for the threshold.
+  long skull_openings = 0;
   int skin_components = 0;
   bool skull_closed_manifold = false;
   bool skin_closed_manifold = false;
@@ -77,11 +79,9 @@ struct CtSurfaces {
   TriangleMesh skull;  ///< patient coordinates, mm, outward, with normals
   TriangleMesh skin;
   CtQuality quality;
-  /// For overlays on the slices: the cropped volume's grid and, on it, what was taken as what.
-  VoxelGrid grid;
-  int first_slice = 0;  ///< of the grid, in the volume oriented to the patient's axes
-  VoxelMask skull_voxels;
-  VoxelMask head_voxels;
+  /// The scan turned to the patient's axes and cropped: what the surfaces were made from.
+  Volume volume;
+  int first_slice = 0;  ///< of it, in the volume before it was cropped
 };
 
 /// Bone and skin surfaces of a head scan. The volume is turned to the patient's axes and cut below

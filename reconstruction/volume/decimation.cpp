@@ -35,7 +35,7 @@ struct Quadric {
 
   void add_plane(const Eigen::Vector3d& normal, double offset, double plane_weight) {
     a += plane_weight * normal * normal.transpose();
-    b -= plane_weight * offset * normal;
+    b += plane_weight * offset * normal;
     c += plane_weight * offset * offset;
     weight += plane_weight;
   }
@@ -84,10 +84,11 @@ class Decimator {
     for (int round = 1; round <= rounds; ++round) {
       const double limit_mm = end_mm * round / rounds;
       // Repeated while it pays: a vertex takes part once in each sweep.
-      for (int sweep = 0; sweep < 6; ++sweep) {
+      const std::size_t worth_while = round < rounds ? 50 : 1000;
+      for (int sweep = 0; sweep < 12; ++sweep) {
         ++sweep_;
         const std::size_t collapsed = collapse_shorter_than(limit_mm);
-        if (collapsed * 50 < left_.size()) break;
+        if (collapsed * worth_while < left_.size()) break;
       }
     }
   }
@@ -256,10 +257,9 @@ class Decimator {
         ++shared;
       }
     });
-    // Three triangles round either end, with both third corners shared, would fold flat.
+    // Two triangles round the vertex that is left would lie on each other.
     const int corners_left = corners_u + corners_v - 4;
-    return shared == 2 && corners_u > 3 && corners_v > 3 &&
-           corners_left <= most_triangles_round_vertex;
+    return shared == 2 && corners_left >= 3 && corners_left <= most_triangles_round_vertex;
   }
 
   bool is_allowed(int u, int v, const Eigen::Vector3d& target) {

@@ -17,8 +17,9 @@ struct HeadRegion {
 
 /// Tells the head from what lies round it. The head is the largest body that is left when
 /// everything thinner than 12 mm is taken away, with the thin parts that belong to it: those that
-/// reach at most 30 mm beyond it, as ears and nose do, where shells and tables reach farther. Fails
-/// with `no_result` where there is no such body.
+/// reach at most 30 mm beyond it, as ears do, where shells and tables reach farther, and those that
+/// are walls round a cavity with a narrow opening, as the nose is. Fails with `no_result` where
+/// there is no such body.
 Result<HeadRegion> find_head(const CoarseVolume& coarse, int tissue_hu, int threads);
 
 }  // namespace skullstation

@@ -163,6 +163,22 @@ TriangleMesh submesh(const TriangleMesh& mesh, const std::function<bool(Eigen::I
   return part;
 }
 
+TriangleMesh largest_component(const TriangleMesh& mesh) {
+  const std::vector<int> component = component_of_triangles(mesh);
+  if (component.empty()) return mesh;
+  std::vector<double> area(1 + static_cast<std::size_t>(*std::ranges::max_element(component)));
+  for (std::size_t f = 0; f < component.size(); ++f) {
+    const auto corners = mesh.triangles.row(static_cast<Eigen::Index>(f));
+    const Eigen::Vector3d a = mesh.vertices.row(corners[0]);
+    const Eigen::Vector3d b = mesh.vertices.row(corners[1]);
+    const Eigen::Vector3d c = mesh.vertices.row(corners[2]);
+    area[static_cast<std::size_t>(component[f])] += (b - a).cross(c - a).norm();
+  }
+  const auto largest = static_cast<int>(std::ranges::max_element(area) - area.begin());
+  return submesh(
+      mesh, [&](Eigen::Index f) { return component[static_cast<std::size_t>(f)] == largest; });
+}
+
 double enclosed_volume(const TriangleMesh& mesh) {
   double six_volumes = 0.0;
   for (Eigen::Index f = 0; f < mesh.triangles.rows(); ++f) {

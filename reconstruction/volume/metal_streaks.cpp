@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
 
 #include "core/parallel.h"
 #include "reconstruction/volume/morphology.h"
@@ -14,6 +15,8 @@ namespace {
 constexpr double least_metal_mm2 = 15.0;
 constexpr double rougher_than_sound = 1.15;
 constexpr double streak_length_mm = 45.0;
+constexpr double widest_gap_mm = 5.0;
+constexpr double bone_slope = 0.1;  // how far bone may lean over on its way from a sound slice
 constexpr int soft_from_hu = -200;
 constexpr int soft_to_hu = 400;
 
@@ -100,7 +103,10 @@ std::vector<StreakedSlices> find_streaks(const Volume& volume, int metal_hu, int
   std::vector<StreakedSlices> streaks;
   for (int k = 0; k < slices; ++k) {
     if (!has_metal(k) || roughness(k) < rougher_than_sound * usual(k)) continue;
-    if (streaks.empty() || streaks.back().last < k - 1) {
+    // Slices between two stacks near each other are no good measure for either.
+    const double gap_mm =
+        streaks.empty() ? 0.0 : (k - streaks.back().last - 1) * volume.grid.spacing_mm.z();
+    if (streaks.empty() || gap_mm > widest_gap_mm) {
       streaks.push_back({k, k});
     } else {
       streaks.back().last = k;
@@ -114,15 +120,21 @@ void remove_bone_streaks(const Volume& volume, int metal_hu,
                          VoxelMask& bone) {
   const Eigen::Vector3d& spacing_mm = volume.grid.spacing_mm;
   for (const StreakedSlices& stack : streaks) {
-    VoxelMask sound(Eigen::Vector3i(bone.size.x(), bone.size.y(), 1));
+    const VoxelMask near_metal = metal_near(volume, metal_hu, stack);
+    std::vector<std::pair<int, std::vector<float>>> sound;  // slice, mm^2 from its bone
     for (const int k : {stack.below(), stack.above()}) {
       if (k < 0 || k >= bone.size.z()) continue;
-      const VoxelMask slice = slice_of(bone, k);
-      for (std::size_t v = 0; v < sound.on.size(); ++v) sound.on[v] |= slice.on[v];
+      sound.emplace_back(k, squared_distance_mm2(slice_of(bone, k), spacing_mm, 1));
     }
-    const VoxelMask allowed = dilated(sound, longest_spike_mm, spacing_mm, 1);
-    const VoxelMask near_metal = metal_near(volume, metal_hu, stack);
     for (int k = stack.first; k <= stack.last; ++k) {
+      VoxelMask allowed(near_metal.size);
+      for (const auto& [other, from_bone_mm2] : sound) {
+        const double reach_mm =
+            longest_spike_mm + bone_slope * std::abs(k - other) * spacing_mm.z();
+        for (std::size_t v = 0; v < allowed.on.size(); ++v) {
+          if (from_bone_mm2[v] <= reach_mm * reach_mm) allowed.on[v] = 1;
+        }
+      }
       std::uint8_t* slice = bone.on.data() + bone.index(0, 0, k);
       for (std::size_t v = 0; v < allowed.on.size(); ++v) {
         if (near_metal.on[v] != 0 && allowed.on[v] == 0) slice[v] = 0;

@@ -1,5 +1,6 @@
 #include "reconstruction/volume/opening_seal.h"
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <queue>
@@ -61,13 +62,43 @@ std::vector<float> depth_below(const VoxelMask& outer, const VoxelMask& solid,
   return depth;
 }
 
+/// The closing of the body by a ball: what the ball can't reach from outside. Beyond the grid there
+/// is air, but for the side of the feet, where the neck goes on.
+VoxelMask closed_by_ball(const VoxelMask& solid, const Eigen::Vector3d& spacing_mm,
+                         double radius_mm, int threads) {
+  const Eigen::Vector3i margin =
+      (spacing_mm.cwiseInverse() * radius_mm).array().ceil().cast<int>() + 1;
+  const Eigen::Vector3i before(margin.x(), margin.y(), 0);
+  VoxelMask padded(solid.size + before + margin);
+  const auto copy = [&](const VoxelMask& from, const Eigen::Vector3i& from_at, VoxelMask& to,
+                        const Eigen::Vector3i& to_at) {
+    for (int k = 0; k < solid.size.z(); ++k) {
+      for (int j = 0; j < solid.size.y(); ++j) {
+        const auto* row = from.on.data() + from.index(from_at.x(), from_at.y() + j, k);
+        std::copy_n(row, solid.size.x(), to.on.data() + to.index(to_at.x(), to_at.y() + j, k));
+      }
+    }
+  };
+  copy(solid, Eigen::Vector3i::Zero(), padded, before);
+  padded = dilated(padded, radius_mm, spacing_mm, threads);
+  padded = eroded(padded, radius_mm, spacing_mm, threads);
+  VoxelMask closed(solid.size);
+  copy(padded, before, closed, Eigen::Vector3i::Zero());
+  return closed;
+}
+
 }  // namespace
+
+VoxelMask filled_behind_openings(const VoxelMask& solid, const Eigen::Vector3d& spacing_mm,
+                                 double opening_mm, int threads) {
+  return inverted(
+      reachable_from_outside(closed_by_ball(solid, spacing_mm, 0.5 * opening_mm, threads)));
+}
 
 VoxelMask sealed_from_outside(const VoxelMask& solid, const Eigen::Vector3d& spacing_mm,
                               const OpeningSealOptions& options, int threads) {
-  const VoxelMask grown = dilated(solid, options.closing_radius_mm, spacing_mm, threads);
-  const VoxelMask closed = eroded(grown, options.closing_radius_mm, spacing_mm, threads);
-  const VoxelMask outer = reachable_from_outside(closed);
+  const VoxelMask outer = reachable_from_outside(
+      closed_by_ball(solid, spacing_mm, options.closing_radius_mm, threads));
   const auto depth = depth_below(outer, solid, spacing_mm, options.depth_mm);
 
   VoxelMask sealed(solid.size);

@@ -17,4 +17,9 @@ struct OpeningSealOptions {
 VoxelMask sealed_from_outside(const VoxelMask& solid, const Eigen::Vector3d& spacing_mm,
                               const OpeningSealOptions& options, int threads);
 
+/// The body with its dents and cavities up to their openings filled, wherever these are at most
+/// `opening_mm` wide.
+VoxelMask filled_behind_openings(const VoxelMask& solid, const Eigen::Vector3d& spacing_mm,
+                                 double opening_mm, int threads);
+
 }  // namespace skullstation

@@ -13,6 +13,8 @@ constexpr double least_mandible_mm3 = 4000.0;
 constexpr double in_front_of_canal_mm = 40.0;
 constexpr double least_mandible_below_mm3 = 5000.0;
 constexpr double well_below_foramen_mm = 25.0;
+/// Nearer to the foramen's height outlines may be the skull base's.
+constexpr double ramus_below_foramen_mm = 15.0;
 
 }  // namespace
 
@@ -56,6 +58,7 @@ std::optional<MandibleExtent> find_mandible(const VoxelMask& skull, const Spinal
       if (z_mm < foramen_z_mm - well_below_foramen_mm) {
         below_mm3 += static_cast<double>(outline.voxels) * spacing_mm.prod();
       }
+      if (z_mm > foramen_z_mm - ramus_below_foramen_mm) continue;
       const double posterior_mm = outline.most.y() * spacing_mm.y();
       // An outline that reaches behind the canal's middle has joined the skull base.
       if (posterior_mm > canal.middle_at(z_mm).y()) continue;

@@ -58,6 +58,12 @@ Eigen::Vector3d SpinalCanal::middle_at(double z_mm) const {
   return nearest;
 }
 
+Eigen::Vector3d SpinalCanal::up() const {
+  const Eigen::Vector3d below = middle_at(foramen_magnum_mm.z() - 30.0);
+  const Eigen::Vector3d along = foramen_magnum_mm - below;
+  return along.z() < 10.0 ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d(along.normalized());
+}
+
 std::optional<SpinalCanal> find_spinal_canal(const CoarseVolume& coarse, const HeadRegion& head,
                                              int threads) {
   const VoxelGrid& grid = coarse.grid;

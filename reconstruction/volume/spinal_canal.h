@@ -18,6 +18,9 @@ struct SpinalCanal {
 
   /// The canal's middle at a height; straight on below the last place known.
   Eigen::Vector3d middle_at(double z_mm) const;
+  /// Unit vector along the uppermost 30 mm of the canal, upwards: how the neck is held. Straight up
+  /// where less than 10 mm of it are known.
+  Eigen::Vector3d up() const;
 };
 
 /// Finds the brain as the largest region of soft tissue more than 16 mm from bone and air, its

@@ -21,11 +21,14 @@ constexpr double skull_above_mm = 6.0;
 constexpr double skull_in_front_mm = 48.0;
 constexpr double skull_aside_mm = 42.0;
 constexpr double skull_aside_down_to_mm = 30.0;
+/// With less bone than this well below the foramen, the scan ends above the spine.
+constexpr double least_spine_mm3 = 1000.0;
 
 enum Label : std::uint8_t { outside_mask = 0, open = 1, queued = 2, skull = 3, spine = 4 };
 
-Label seed_at(const Eigen::Vector3d& place, const SpinalCanal& canal) {
-  const double below_mm = canal.foramen_magnum_mm.z() - place.z();
+/// `up` is the canal's: heads are nodded and tilted.
+Label seed_at(const Eigen::Vector3d& place, const SpinalCanal& canal, const Eigen::Vector3d& up) {
+  const double below_mm = (canal.foramen_magnum_mm - place).dot(up);
   const Eigen::Vector3d from_middle = place - canal.middle_at(place.z());
   const double aside_mm = std::abs(from_middle.x());
   if (below_mm < -skull_above_mm || from_middle.y() < -skull_in_front_mm) return skull;
@@ -155,19 +158,23 @@ std::size_t remove_spine(const Volume& volume, const SpinalCanal& canal, VoxelMa
   const VoxelGrid& grid = volume.grid;
   const Box box = box_round(canal, grid);
   Watershed watershed(volume, box);
-  bool any_spine = false;
+  const Eigen::Vector3d up = canal.up();
+  double sure_spine_mm3 = 0.0;
   for (int k = 0; k < box.size.z(); ++k) {
     for (int j = 0; j < box.size.y(); ++j) {
       for (int i = 0; i < box.size.x(); ++i) {
         const Eigen::Vector3i voxel = box.least + Eigen::Vector3i(i, j, k);
         if (!bone.at(voxel.x(), voxel.y(), voxel.z())) continue;
-        const Label seed = seed_at(voxel.cast<double>().cwiseProduct(grid.spacing_mm), canal);
+        const Eigen::Vector3d place = voxel.cast<double>().cwiseProduct(grid.spacing_mm);
+        const Label seed = seed_at(place, canal, up);
         watershed.label(i, j, k) = seed;
-        any_spine = any_spine || seed == spine;
+        const bool well_below =
+            (canal.foramen_magnum_mm - place).dot(up) > spine_begins_below_mm;
+        if (seed == spine && well_below) sure_spine_mm3 += grid.spacing_mm.prod();
       }
     }
   }
-  if (!any_spine) return 0;
+  if (sure_spine_mm3 < least_spine_mm3) return 0;
   watershed.flood();
   std::size_t removed = 0;
   for (int k = 0; k < box.size.z(); ++k) {

@@ -38,11 +38,14 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"daemon/station",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
       "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/phantom"}},
+    {"daemon/subject",
+     {"core", "core/session", "reconstruction/io", "reconstruction/rendering",
+      "reconstruction/volume"}},
     {"daemon/cli",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
       "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/distance",
       "reconstruction/rendering", "reconstruction/volume", "reconstruction/phantom",
-      "daemon/station"}},
+      "daemon/station", "daemon/subject"}},
 };
 
 /// Headers that take seconds to compile: for their own folder only, behind our own plain types.

@@ -47,9 +47,11 @@ struct AnalyticHead {
     return std::abs(p.x()) > 70.0 && std::abs(p.x()) < 96.0 && std::abs(p.y() - 10.0) < 2.5 &&
            std::abs(p.z()) < 20.0;
   }
+  /// A round cavity between skin and skull, and the nostril that leads into it.
+  static Eigen::Vector3d airway() { return {0.0, -83.0, -32.0}; }
   static bool in_airway(const Eigen::Vector3d& p) {
-    const bool nostril = std::hypot(p.x(), p.z() + 34.0) < 5.0 && p.y() < -60.0;
-    return nostril || (p - Eigen::Vector3d(0, -92, -34)).norm() < 11.0;
+    const bool nostril = std::hypot(p.x(), p.z() + 32.0) < 4.0 && p.y() < airway().y();
+    return nostril || (p - airway()).norm() < 7.0;
   }
   static bool in_skin(const Eigen::Vector3d& p) {
     return ellipsoid(p, {0, -2, 0}, {80, 102, 82}) < 1.0 ||

@@ -68,9 +68,10 @@ TEST(CtSurfaces, TheVolumeIsCutBelowTheMandible) {
   ASSERT_TRUE(surfaces->quality.crop_z_mm);
   EXPECT_NEAR(*surfaces->quality.crop_z_mm, -115.0, 3.5);
   EXPECT_NEAR(surfaces->skin.vertices.col(2).minCoeff(), *surfaces->quality.crop_z_mm, 0.3);
-  EXPECT_EQ(surfaces->skull_voxels.size, surfaces->grid.size);
-  EXPECT_EQ(surfaces->head_voxels.size, surfaces->grid.size);
+  const Volume& cropped = surfaces->volume;
+  EXPECT_EQ(cropped.hu.size(), cropped.grid.count());
   EXPECT_GT(surfaces->first_slice, 0);
+  EXPECT_EQ(cropped.at(70, 60, 0), AnalyticHead{}.volume().at(70, 60, surfaces->first_slice));
   CtSurfaceOptions options = coarse_options();
   options.crop = false;
   const auto whole = extract_ct_surfaces(AnalyticHead{}.volume(), options);
@@ -91,7 +92,7 @@ TEST(CtSurfaces, TheSkinIsTheOutsideAloneWithNoseAndEars) {
   EXPECT_LT(skin.vertices.col(0).minCoeff(), -93.0) << "an ear is gone";
   EXPECT_EQ(
       count_vertices(
-          skin, [](const auto& p) { return (p - Eigen::Vector3d(0, -92, -34)).norm() < 13.0; }),
+          skin, [](const auto& p) { return (p - AnalyticHead::airway()).norm() < 8.5; }),
       0)
       << "the airway is open";
   EXPECT_GT(enclosed_volume(skin), 2e6);
@@ -254,10 +255,11 @@ TEST(CtSurfaces, TheRealHead) {
   EXPECT_FALSE(warned(*surfaces, CtWarning::no_mandible));
   EXPECT_FALSE(warned(*surfaces, CtWarning::cropped_nose));
   EXPECT_FALSE(warned(*surfaces, CtWarning::cropped_vertex));
-  // The table begins behind row 230; the ears reach out to both sides of columns 40 and 195.
+  // The head rests on row 237 of the cushion's shell, which begins at row 239; the ears reach out
+  // to both sides of columns 40 and 180.
   const auto row = [&](double j) { return grid.patient_from_voxel({0, j, 0}).y(); };
   const auto column = [&](double i) { return grid.patient_from_voxel({i, 0, 0}).x(); };
-  EXPECT_LT(surfaces->skin.vertices.col(1).maxCoeff(), row(228));
+  EXPECT_LT(surfaces->skin.vertices.col(1).maxCoeff(), row(239));
   EXPECT_LT(surfaces->skin.vertices.col(0).minCoeff(), column(40));
   EXPECT_GT(surfaces->skin.vertices.col(0).maxCoeff(), column(180));
 }
