@@ -102,9 +102,9 @@ struct CompareCommand {
   std::filesystem::path a;
   std::filesystem::path b;
   Alignment align = Alignment::none;  ///< how A may be moved to B first
-  std::filesystem::path region;  ///< vertices of A that count; empty: all
-  std::filesystem::path out;     ///< A, moved and coloured by distance; empty: not written
-  double full_color_mm = 2.0;    ///< distance at which the colour is full
+  std::filesystem::path region;       ///< vertices of A that count; empty: all
+  std::filesystem::path out;          ///< A, moved and coloured by distance; empty: not written
+  double full_color_mm = 2.0;         ///< distance at which the colour is full
 };
 Result<CommandReport> run(const CompareCommand&, const CommonOptions&, const Progress&);
 

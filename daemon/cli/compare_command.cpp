@@ -24,10 +24,14 @@ const char* to_string(Alignment align) {
 }
 
 nlohmann::ordered_json json_of(const DistanceStatistics& s, double bin_mm) {
-  return {{"area_mm2", s.area_mm2},   {"samples", s.samples},
-          {"mean_mm", s.mean_mm},     {"rms_mm", s.rms_mm},
-          {"median_mm", s.median_mm}, {"p95_mm", s.p95_mm},
-          {"max_mm", s.max_mm},       {"signed_mean_mm", s.signed_mean_mm},
+  return {{"area_mm2", s.area_mm2},
+          {"samples", s.samples},
+          {"mean_mm", s.mean_mm},
+          {"rms_mm", s.rms_mm},
+          {"median_mm", s.median_mm},
+          {"p95_mm", s.p95_mm},
+          {"max_mm", s.max_mm},
+          {"signed_mean_mm", s.signed_mean_mm},
           {"histogram", {{"bin_mm", bin_mm}, {"share_of_area", s.histogram}}}};
 }
 
@@ -92,7 +96,8 @@ Result<CommandReport> run(const CompareCommand& command, const CommonOptions& co
   options.align = command.align;
   if (!command.out.empty() && command.out.extension() != ".ply" &&
       command.out.extension() != ".glb") {
-    return fail(ErrorKind::usage, command.out.string(), "a coloured mesh's name ends in .ply or .glb");
+    return fail(ErrorKind::usage, command.out.string(),
+                "a coloured mesh's name ends in .ply or .glb");
   }
   progress.report(0.0, "reading");
   const auto a = read_mesh(command.a);

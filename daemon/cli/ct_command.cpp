@@ -15,10 +15,10 @@ CommandReport report_of(const CtSurfaces& surfaces, const VolumeInfo& info,
                         const std::filesystem::path& folder) {
   const CtQuality& q = surfaces.quality;
   CommandReport report;
-  report.text = fmt::format(
-      "{}\n  skull: {} vertices, {}\n  skin:  {} vertices, {}\n", folder.string(),
-      surfaces.skull.vertices.rows(), q.skull_closed_manifold ? "closed" : "NOT CLOSED",
-      surfaces.skin.vertices.rows(), q.skin_closed_manifold ? "closed" : "NOT CLOSED");
+  report.text =
+      fmt::format("{}\n  skull: {} vertices, {}\n  skin:  {} vertices, {}\n", folder.string(),
+                  surfaces.skull.vertices.rows(), q.skull_closed_manifold ? "closed" : "NOT CLOSED",
+                  surfaces.skin.vertices.rows(), q.skin_closed_manifold ? "closed" : "NOT CLOSED");
   for (const std::string& correction : info.warnings) report.text += "note: " + correction + "\n";
   for (const CtFinding& finding : q.findings) {
     report.text += fmt::format("warning: {}: {}\n", to_string(finding.warning), finding.text);
@@ -44,8 +44,7 @@ Result<CommandReport> run(const CtImportCommand& command, const CommonOptions& c
   if (!volume) return forward(volume);
   const SubjectSource source{volume->info, volume->grid, volume_sha256(*volume), options,
                              SKULLSTATION_VERSION};
-  const auto surfaces =
-      extract_ct_surfaces(*std::move(volume), options, progress.part(0.25, 0.85));
+  const auto surfaces = extract_ct_surfaces(*std::move(volume), options, progress.part(0.25, 0.85));
   if (!surfaces) return forward(surfaces);
   if (const auto written = write_subject_folder(*surfaces, source, command.out, common.threads,
                                                 progress.part(0.85, 1.0));

@@ -47,23 +47,22 @@ std::string quality_json(const CtSurfaces& surfaces) {
   for (const StreakedSlices& stack : q.streaks) streaks.push_back({stack.first, stack.last});
   Json skull = json_of(surfaces.skull, q.skull_components, q.skull_closed_manifold);
   skull["openings"] = q.skull_openings;
-  Json json = {
-      {"format", "skullstation-ct-quality/1"},
-      {"warnings", warnings},
-      {"spacing_mm", json_of(q.spacing_mm)},
-      {"skull", skull},
-      {"skin", json_of(surfaces.skin, q.skin_components, q.skin_closed_manifold)},
-      {"bone_parts_kept", q.bone_parts_kept},
-      {"bone_parts_removed", q.bone_parts_removed},
-      {"mandible_apart", q.mandible_apart},
-      {"mandible_most_posterior_mm",
-       q.mandible_most_posterior_mm ? json_of(*q.mandible_most_posterior_mm) : Json()},
-      {"crop_z_mm", value_or_null(q.crop_z_mm)},
-      {"spine_removed_mm3", q.spine_removed_mm3},
-      {"surroundings_removed_mm3", q.surroundings_removed_mm3},
-      {"contact_front_mm2", q.contact_front_mm2},
-      {"contact_back_mm2", q.contact_back_mm2},
-      {"streaked_slices", streaks}};
+  Json json = {{"format", "skullstation-ct-quality/1"},
+               {"warnings", warnings},
+               {"spacing_mm", json_of(q.spacing_mm)},
+               {"skull", skull},
+               {"skin", json_of(surfaces.skin, q.skin_components, q.skin_closed_manifold)},
+               {"bone_parts_kept", q.bone_parts_kept},
+               {"bone_parts_removed", q.bone_parts_removed},
+               {"mandible_apart", q.mandible_apart},
+               {"mandible_most_posterior_mm",
+                q.mandible_most_posterior_mm ? json_of(*q.mandible_most_posterior_mm) : Json()},
+               {"crop_z_mm", value_or_null(q.crop_z_mm)},
+               {"spine_removed_mm3", q.spine_removed_mm3},
+               {"surroundings_removed_mm3", q.surroundings_removed_mm3},
+               {"contact_front_mm2", q.contact_front_mm2},
+               {"contact_back_mm2", q.contact_back_mm2},
+               {"streaked_slices", streaks}};
   return json.dump(2) + "\n";
 }
 

@@ -50,9 +50,8 @@ void add_figures(HtmlReport& report, const CtSurfaces& surfaces) {
        {"spine removed", fmt::format("{:.1f} ml", q.spine_removed_mm3 / 1000.0)},
        {"head rest, table and cables removed",
         fmt::format("{:.0f} ml", q.surroundings_removed_mm3 / 1000.0)},
-       {"they touched the head on",
-        fmt::format("{:.0f} mm^2 in front, {:.0f} mm^2 behind", q.contact_front_mm2,
-                    q.contact_back_mm2)},
+       {"they touched the head on", fmt::format("{:.0f} mm^2 in front, {:.0f} mm^2 behind",
+                                                q.contact_front_mm2, q.contact_back_mm2)},
        {"cropped at", in_words(q.crop_z_mm, "z = {:.1f} mm", "not cropped")}});
 }
 
@@ -67,12 +66,12 @@ void add_source(HtmlReport& report, const SubjectSource& source) {
                            source.grid.spacing_mm.x(), source.grid.spacing_mm.y(),
                            source.grid.spacing_mm.z())},
       {"SHA-256 of its voxels and geometry", source.sha256},
-      {"scanner", known(info.manufacturer + (info.scanner_model.empty() ? "" : " ") +
-                        info.scanner_model)},
+      {"scanner",
+       known(info.manufacturer + (info.scanner_model.empty() ? "" : " ") + info.scanner_model)},
       {"kernel", known(info.convolution_kernel)},
-      {"sex, age", fmt::format("{}, {}", known(info.sex),
-                               info.age_years ? fmt::format("{} years", *info.age_years)
-                                              : "not stated")},
+      {"sex, age",
+       fmt::format("{}, {}", known(info.sex),
+                   info.age_years ? fmt::format("{} years", *info.age_years) : "not stated")},
       {"skin, bone, metal from", fmt::format("{}, {}, {} HU", o.skin_hu, o.bone_hu, o.metal_hu)},
       {"mean edge", fmt::format("{:.2f} mm, moved by at most {:.2f} mm", o.decimation.edge_mm,
                                 o.decimation.max_error_mm)},

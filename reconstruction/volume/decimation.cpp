@@ -15,7 +15,7 @@ namespace {
 
 /// Edges shorter than this share of the wanted mean are collapsed; what is left is then on average
 /// as long as wanted (measured on spheres and heads).
-constexpr double collapse_share = 0.76;
+constexpr double collapse_share = 0.68;
 /// No edge grows beyond this multiple of the wanted mean.
 constexpr double longest_share = 1.7;
 constexpr int rounds = 8;

@@ -87,8 +87,8 @@ Result<HeadRegion> find_head(const CoarseVolume& coarse, int tissue_hu, int thre
   if (!body) return forward(body);
   // With nostrils and mouth closed the nose is thick too.
   const auto closed_body = thick_body(
-      coarse,
-      filled_behind_openings(tissue, coarse.grid.spacing_mm, widest_opening_mm, threads), threads);
+      coarse, filled_behind_openings(tissue, coarse.grid.spacing_mm, widest_opening_mm, threads),
+      threads);
   if (!closed_body) return forward(closed_body);
   const auto from_body_mm2 = squared_distance_mm2(*body, coarse.grid.spacing_mm, threads);
 
@@ -111,8 +111,8 @@ Result<HeadRegion> find_head(const CoarseVolume& coarse, int tissue_hu, int thre
   std::vector<bool> belongs(parts.all().size(), false);
   for (std::size_t part = 0; part < belongs.size(); ++part) {
     const double volume_mm3 = static_cast<double>(parts.all()[part].voxels) * voxel_mm3(coarse);
-    const bool small = std::sqrt(reach_mm2[part]) <= farthest_thin_part_mm &&
-                       volume_mm3 <= largest_thin_part_mm3;
+    const bool small =
+        std::sqrt(reach_mm2[part]) <= farthest_thin_part_mm && volume_mm3 <= largest_thin_part_mm3;
     const bool wall = static_cast<double>(in_closed_body[part]) >=
                       least_share_of_a_wall * static_cast<double>(parts.all()[part].voxels);
     belongs[part] = touches[part] && (small || wall);

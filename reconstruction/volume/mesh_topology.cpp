@@ -175,8 +175,8 @@ TriangleMesh largest_component(const TriangleMesh& mesh) {
     area[static_cast<std::size_t>(component[f])] += (b - a).cross(c - a).norm();
   }
   const auto largest = static_cast<int>(std::ranges::max_element(area) - area.begin());
-  return submesh(
-      mesh, [&](Eigen::Index f) { return component[static_cast<std::size_t>(f)] == largest; });
+  return submesh(mesh,
+                 [&](Eigen::Index f) { return component[static_cast<std::size_t>(f)] == largest; });
 }
 
 double enclosed_volume(const TriangleMesh& mesh) {

@@ -23,8 +23,8 @@ struct StreakedSlices {
 std::vector<StreakedSlices> find_streaks(const Volume& volume, int metal_hu, int threads);
 
 /// Takes streaks off a bone mask: in streaked slices, bone within 45 mm of metal is kept only where
-/// one of the sound slices next to the stack has bone within `longest_spike_mm`, and 0.1 mm more for
-/// every mm between the slices, since bone may lean.
+/// one of the sound slices next to the stack has bone within `longest_spike_mm`, and 0.1 mm more
+/// for every mm between the slices, since bone may lean.
 void remove_bone_streaks(const Volume& volume, int metal_hu,
                          const std::vector<StreakedSlices>& streaks, double longest_spike_mm,
                          VoxelMask& bone);

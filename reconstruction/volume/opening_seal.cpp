@@ -97,8 +97,8 @@ VoxelMask filled_behind_openings(const VoxelMask& solid, const Eigen::Vector3d& 
 
 VoxelMask sealed_from_outside(const VoxelMask& solid, const Eigen::Vector3d& spacing_mm,
                               const OpeningSealOptions& options, int threads) {
-  const VoxelMask outer = reachable_from_outside(
-      closed_by_ball(solid, spacing_mm, options.closing_radius_mm, threads));
+  const VoxelMask outer =
+      reachable_from_outside(closed_by_ball(solid, spacing_mm, options.closing_radius_mm, threads));
   const auto depth = depth_below(outer, solid, spacing_mm, options.depth_mm);
 
   VoxelMask sealed(solid.size);

@@ -46,8 +46,7 @@ Layout layout_of(const VoxelGrid& grid, int axis, double pixel_mm) {
 double value_at(const Volume& volume, const SlicePlane& plane, const Layout& layout,
                 const Eigen::Vector2d& place) {
   const Eigen::Vector2i last = layout.voxels - Eigen::Vector2i::Ones();
-  const Eigen::Vector2d inside =
-      place.cwiseMax(0.0).cwiseMin(last.cast<double>());
+  const Eigen::Vector2d inside = place.cwiseMax(0.0).cwiseMin(last.cast<double>());
   const Eigen::Vector2i low = inside.cast<int>();
   const Eigen::Vector2d t = inside - low.cast<double>();
   double value = 0.0;
@@ -117,8 +116,8 @@ Image8 slice_picture(const Volume& volume, const SlicePlane& plane,
   Image8 picture(layout.pixels.x(), layout.pixels.y(), 3);
   for (int y = 0; y < picture.height; ++y) {
     for (int x = 0; x < picture.width; ++x) {
-      Eigen::Vector2d place = Eigen::Vector2d(x + 0.5, y + 0.5)
-                                  .cwiseProduct(layout.voxels_per_pixel);
+      Eigen::Vector2d place =
+          Eigen::Vector2d(x + 0.5, y + 0.5).cwiseProduct(layout.voxels_per_pixel);
       place.array() -= 0.5;
       if (layout.flipped) place.y() = layout.voxels.y() - 1.0 - place.y();
       const double hu = value_at(volume, plane, layout, place);

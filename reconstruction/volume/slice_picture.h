@@ -17,7 +17,7 @@ struct SlicePlane {
 
 /// A surface whose section is drawn over a slice.
 struct SliceOutline {
-  const TriangleMesh* mesh = nullptr;  ///< patient coordinates, mm
+  const TriangleMesh* mesh = nullptr;    ///< patient coordinates, mm
   Eigen::Vector3d color{1.0, 0.5, 0.0};  ///< sRGB in [0, 1]
 };
 

@@ -168,8 +168,7 @@ std::size_t remove_spine(const Volume& volume, const SpinalCanal& canal, VoxelMa
         const Eigen::Vector3d place = voxel.cast<double>().cwiseProduct(grid.spacing_mm);
         const Label seed = seed_at(place, canal, up);
         watershed.label(i, j, k) = seed;
-        const bool well_below =
-            (canal.foramen_magnum_mm - place).dot(up) > spine_begins_below_mm;
+        const bool well_below = (canal.foramen_magnum_mm - place).dot(up) > spine_begins_below_mm;
         if (seed == spine && well_below) sure_spine_mm3 += grid.spacing_mm.prod();
       }
     }

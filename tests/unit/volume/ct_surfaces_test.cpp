@@ -91,8 +91,7 @@ TEST(CtSurfaces, TheSkinIsTheOutsideAloneWithNoseAndEars) {
   EXPECT_GT(skin.vertices.col(0).maxCoeff(), 93.0) << "an ear is gone";
   EXPECT_LT(skin.vertices.col(0).minCoeff(), -93.0) << "an ear is gone";
   EXPECT_EQ(
-      count_vertices(
-          skin, [](const auto& p) { return (p - AnalyticHead::airway()).norm() < 8.5; }),
+      count_vertices(skin, [](const auto& p) { return (p - AnalyticHead::airway()).norm() < 8.5; }),
       0)
       << "the airway is open";
   EXPECT_GT(enclosed_volume(skin), 2e6);
