@@ -1,6 +1,7 @@
 #include "daemon/subject/subject_folder.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <system_error>
@@ -21,7 +22,7 @@ namespace {
 class StagedFolder {
  public:
   explicit StagedFolder(fs::path place) : place_(std::move(place)) {
-    staged_ = place_.parent_path() / ("." + place_.filename().string() + ".unfinished");
+    staged_ = place_.parent_path() / fmt::format(".{}.unfinished", place_.filename().string());
     std::error_code ignored;
     fs::remove_all(staged_, ignored);
   }
