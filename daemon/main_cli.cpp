@@ -165,6 +165,18 @@ void add_commands(CLI::App& app, Command& chosen) {
         add_surface_options(ct_import, o.surfaces);
       });
 
+  add<PhantomCommand>(
+      app, "phantom", "make synthetic people: bone and skin surfaces, landmarks, true thickness",
+      chosen, [](CLI::App& phantom, PhantomCommand& o) {
+        phantom.add_option("--count", o.count, "how many")
+            ->capture_default_str()
+            ->check(CLI::Range(1, 100000));
+        phantom.add_option("--out", o.out, "folder for a subject folder each")->required();
+        phantom.add_option("--edge", o.edge_mm, "length of the surfaces' edges, in mm")
+            ->capture_default_str()
+            ->check(CLI::Range(0.5, 5.0));
+      });
+
   add<DoctorCommand>(app, "doctor", "check devices, space and calibration; say what to mend",
                      chosen, [](CLI::App& doctor, DoctorCommand& o) {
                        doctor.add_option("--config", o.config, config_help);

@@ -82,6 +82,14 @@ struct PictureCommand {
 };
 Result<CommandReport> run(const PictureCommand&, const CommonOptions&, const Progress&);
 
+/// Makes synthetic people with exactly known anatomy: one subject folder each.
+struct PhantomCommand {
+  int count = 1;
+  std::filesystem::path out;
+  double edge_mm = 1.5;
+};
+Result<CommandReport> run(const PhantomCommand&, const CommonOptions&, const Progress&);
+
 /// Checks devices, space and calibration, and says what to mend.
 struct DoctorCommand {
   std::filesystem::path config;
