@@ -1,0 +1,64 @@
+#include "reconstruction/photogrammetry/depth_agreement.h"
+
+#include <cmath>
+
+namespace skullstation {
+
+namespace {
+
+/// Does the source's own depth confirm that its surface lies where the reference puts it?
+bool confirms(const DepthMap& source, const PixelWarp& to, const PixelWarp& back, float x, float y,
+              float w, const DepthMapOptions& options) {
+  const float z = to.a[6] * x + to.a[7] * y + to.a[8] + to.b[2] * w;
+  const float u = (to.a[0] * x + to.a[1] * y + to.a[2] + to.b[0] * w) / z;
+  const float v = (to.a[3] * x + to.a[4] * y + to.a[5] + to.b[1] * w) / z;
+  if (!(z > 0.0f && u >= 0.0f && v >= 0.0f)) return false;
+  const int column = static_cast<int>(u);
+  const int row = static_cast<int>(v);
+  if (column >= source.camera.width || row >= source.camera.height) return false;
+  const InversePlane& plane = source.planes[source.index(column, row)];
+  if (plane.w == 0.0f) return false;
+  const float there =
+      plane.at(u - static_cast<float>(column) - 0.5f, v - static_cast<float>(row) - 0.5f);
+  // z / w is the point's depth in the source's camera; the pixel's size there is depth / f.
+  const float expected = w / z;
+  const auto limit = static_cast<float>(options.agreement_mm_per_pixel / source.camera.fx);
+  if (!(std::abs(there - expected) <=
+        limit * expected *
+            (1.0f + 3.0f * std::hypot(plane.gx, plane.gy) * static_cast<float>(source.camera.fx) /
+                        plane.w)))
+    return false;
+  const float bz = back.a[6] * u + back.a[7] * v + back.a[8] + back.b[2] * there;
+  const float bx = (back.a[0] * u + back.a[1] * v + back.a[2] + back.b[0] * there) / bz;
+  const float by = (back.a[3] * u + back.a[4] * v + back.a[5] + back.b[1] * there) / bz;
+  return std::hypot(bx - x, by - y) <= static_cast<float>(options.agreement_px);
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> count_agreement(std::span<const DepthMap> maps, int reference,
+                                          const DepthMapOptions& options) {
+  const DepthMap& map = maps[reference];
+  std::vector<std::uint8_t> count(map.planes.size(), 0);
+  for (const int other : map.sources) {
+    const DepthMap& source = maps[other];
+    const PixelWarp to =
+        pixel_warp(map.camera, map.camera_from_table, source.camera, source.camera_from_table);
+    const PixelWarp back =
+        pixel_warp(source.camera, source.camera_from_table, map.camera, map.camera_from_table);
+    for (int y = 0; y < map.camera.height; ++y) {
+      for (int x = 0; x < map.camera.width; ++x) {
+        const std::size_t i = map.index(x, y);
+        const float w = map.planes[i].w;
+        if (w == 0.0f) continue;
+        count[i] += confirms(source, to, back, static_cast<float>(x) + 0.5f,
+                             static_cast<float>(y) + 0.5f, w, options)
+                        ? 1
+                        : 0;
+      }
+    }
+  }
+  return count;
+}
+
+}  // namespace skullstation
