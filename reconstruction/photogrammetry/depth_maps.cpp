@@ -25,11 +25,11 @@ std::vector<Round> plan_rounds(const DepthMapOptions& options) {
   for (int level = options.coarsest_level; level >= options.finest_level; --level) {
     if (level == options.coarsest_level) {
       Round search{level, false, {}};
-      for (int i = 0; i < 5; ++i) {
+      for (int i = 0; i < 6; ++i) {
         SweepOptions sweep;
-        sweep.random_trials = i < 3 ? 2 : 0;
-        sweep.depth_step_px = i < 2 ? 4.0 : 1.0;
-        sweep.slope_step = i < 2 ? 0.8 : 0.4;
+        sweep.random_trials = i < 4 ? 2 : 0;
+        sweep.depth_step_px = i < 3 ? 4.0 : 1.0;
+        sweep.slope_step = i < 3 ? 0.8 : 0.4;
         sweep.refinements = 3;
         search.sweeps.push_back(sweep);
       }
@@ -43,6 +43,8 @@ std::vector<Round> plan_rounds(const DepthMapOptions& options) {
       sweep.depth_step_px = i == 0 ? 1.0 : 0.4;
       sweep.slope_step = i == 0 ? 0.4 : 0.2;
       sweep.refinements = level == 0 ? 2 : 3;
+      // What is too thin for the coarsest level is found on the next.
+      sweep.random_trials = level == options.coarsest_level - 1 && i == 0 ? 2 : 0;
       sweep.score_all_sources = level > 0;
       round.sweeps.push_back(sweep);
       if (last && i == 1) {

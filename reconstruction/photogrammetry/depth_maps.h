@@ -28,7 +28,7 @@ struct DepthMap {
 struct DepthMapOptions {
   int source_views = 8;  ///< per view, in [2, 8]
   int finest_level = 0;  ///< 0: the photographs' size, 1: half of it, 2: a quarter
-  int coarsest_level = 2;
+  int coarsest_level = 3;
   int hull_resolution = 112;  ///< voxels along the longest side
   /// Confirmation by another view: forward-backward error and difference in depth, at most.
   double agreement_px = 1.0;

@@ -4,15 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-
-// Copies of the hot loop for wider vectors, chosen when the program starts. Lanes are summed in a
-// fixed order and multiply-add is never fused, so all copies give the same bytes.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define SKULLSTATION_WIDE_LANES \
-  __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"), optimize("O3")))
-#else
-#define SKULLSTATION_WIDE_LANES
-#endif
+#include <cstring>
 
 namespace skullstation {
 
@@ -126,92 +118,59 @@ void PatchMaker::make(const Image8& grey, const Image8& mask, int x, int y, Patc
   for (int i = 0; i < kPatchSamples; ++i) patch.contrast[i] *= normal;
 }
 
-SKULLSTATION_WIDE_LANES
+namespace {
+
+/// Portable: the compiler makes of it what the machine has.
+struct PlainGather {
+  static constexpr int kWidth = 4;
+  using Int = Lanes<4>::Int;
+  static void load(const std::uint32_t* from, const Int& index, Int& out) {
+    for (int i = 0; i < 4; ++i) out[i] = static_cast<std::int32_t>(from[index[i]]);
+  }
+};
+
+void score_portable(const ScoreInput& in, float* costs) { score_with<PlainGather>(in, costs); }
+
+using Score = void (*)(const ScoreInput&, float*);
+
+Score choose_score() {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw")) {
+    return score_avx512;
+  }
+  if (__builtin_cpu_supports("avx2")) return score_avx2;
+#endif
+  return score_portable;
+}
+
+const Score kScore = choose_score();
+
+}  // namespace
+
 void score_plane(const Patch& patch, float noise_variance, float x, float y,
                  const InversePlane& plane, const QuadImage* const* images, const PixelWarp* warps,
                  const std::uint8_t* named, int count, float* costs) {
-  const float* const offset_x = kLanes.x.data();
-  const float* const offset_y = kLanes.y.data();
-  const float* const weight = patch.weight.data();
-  const float* const contrast = patch.contrast.data();
+  ScoreInput in{};
+  in.offset_x = kLanes.x.data();
+  in.offset_y = kLanes.y.data();
+  in.weight = patch.weight.data();
+  in.contrast = patch.contrast.data();
+  in.mean = patch.mean;
+  in.noise_variance = noise_variance;
+  in.x = x;
+  in.y = y;
+  in.w = plane.w;
+  in.gx = plane.gx;
+  in.gy = plane.gy;
+  in.count = count;
   for (int k = 0; k < count; ++k) {
-    const PixelWarp& warp = warps[named[k]];
     const QuadImage& image = *images[named[k]];
-    const auto& a = warp.a;
-    const auto& b = warp.b;
-    const float z = a[6] * x + a[7] * y + a[8] + b[2] * plane.w;
-    const float depth = 1.0f / z;
-    const float u = (a[0] * x + a[1] * y + a[2] + b[0] * plane.w) * depth;
-    const float v = (a[3] * x + a[4] * y + a[5] + b[1] * plane.w) * depth;
-    const auto last_x = static_cast<float>(image.width - 1);
-    const auto last_y = static_cast<float>(image.height - 1);
-    if (!(z > 0.0f && u >= 1.0f && v >= 1.0f && u <= last_x && v <= last_y)) {
-      costs[k] = kWorstCost;
-      continue;
-    }
-    const float zx = a[6] + b[2] * plane.gx;
-    const float zy = a[7] + b[2] * plane.gy;
-    const float ux = (a[0] + b[0] * plane.gx - u * zx) * depth;
-    const float uy = (a[1] + b[0] * plane.gy - u * zy) * depth;
-    const float vx = (a[3] + b[1] * plane.gx - v * zx) * depth;
-    const float vy = (a[4] + b[1] * plane.gy - v * zy) * depth;
-    const float u0 = u - 0.5f;
-    const float v0 = v - 0.5f;
-    const int stride = image.width;
-    const std::uint32_t* const quads = image.quads.data();
-    const float mean = patch.mean;
-
-    alignas(64) float sum[kPatchLanes];
-    alignas(64) float square[kPatchLanes];
-    alignas(64) float product[kPatchLanes];
-    for (int i = 0; i < kPatchLanes; ++i) {
-      float s = u0 + ux * offset_x[i] + uy * offset_y[i];
-      float t = v0 + vx * offset_x[i] + vy * offset_y[i];
-      s = s < 0.0f ? 0.0f : s;
-      s = s > last_x ? last_x : s;
-      t = t < 0.0f ? 0.0f : t;
-      t = t > last_y ? last_y : t;
-      const int column = static_cast<int>(s);
-      const int row = static_cast<int>(t);
-      const float fs = s - static_cast<float>(column);
-      const float ft = t - static_cast<float>(row);
-      const std::uint32_t quad = quads[row * stride + column];
-      const auto q00 = static_cast<float>(static_cast<int>(quad & 255u));
-      const auto q10 = static_cast<float>(static_cast<int>((quad >> 8) & 255u));
-      const auto q01 = static_cast<float>(static_cast<int>((quad >> 16) & 255u));
-      const auto q11 = static_cast<float>(static_cast<int>(quad >> 24));
-      const float upper = q00 + fs * (q10 - q00);
-      const float lower = q01 + fs * (q11 - q01);
-      const float value = upper + ft * (lower - upper) - mean;
-      sum[i] = weight[i] * value;
-      square[i] = weight[i] * value * value;
-      product[i] = contrast[i] * value;
-    }
-    // Pairwise: 16 lanes, 8, 4, 2, 1.
-    for (int i = 0; i < 16; ++i) {
-      sum[i] += sum[i + 16];
-      square[i] += square[i + 16];
-      product[i] += product[i + 16];
-    }
-    for (int i = 0; i < 8; ++i) {
-      sum[i] += sum[i + 8];
-      square[i] += square[i + 8];
-      product[i] += product[i + 8];
-    }
-    for (int i = 0; i < 4; ++i) {
-      sum[i] += sum[i + 4];
-      square[i] += square[i + 4];
-      product[i] += product[i + 4];
-    }
-    const auto total = [](const float* lanes) {
-      return (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
-    };
-    const float sum_all = total(sum);
-    const float variance = total(square) - sum_all * sum_all;
-    const float correlation =
-        total(product) / std::sqrt((variance > 0.0f ? variance : 0.0f) + noise_variance);
-    costs[k] = 1.0f - correlation;
+    const PixelWarp& warp = warps[named[k]];
+    in.sources[k] = {image.quads.data(), image.width, image.height, warp.a.data(), warp.b.data()};
   }
+  kScore(in, costs);
 }
 
 }  // namespace skullstation

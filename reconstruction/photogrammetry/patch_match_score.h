@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/image.h"
+#include "reconstruction/photogrammetry/patch_match_lanes.h"
 #include "reconstruction/photogrammetry/stereo_view.h"
 
 namespace skullstation {
@@ -39,7 +40,6 @@ struct QuadImage {
 QuadImage packed_quads(const Image8& grey);
 
 /// The window: 29 pixels of the quincunx lattice within 4.3 px, in 32 lanes of which 3 are idle.
-inline constexpr int kPatchLanes = 32;
 inline constexpr int kPatchSamples = 29;
 inline constexpr int kPatchRadius = 4;
 struct PatchOffsets {

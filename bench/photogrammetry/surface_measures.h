@@ -1,0 +1,27 @@
+#pragma once
+
+#include <span>
+
+#include "core/result.h"
+#include "core/triangle_mesh.h"
+#include "reconstruction/photogrammetry/stereo_view.h"
+
+namespace skullstation {
+
+/// A reconstructed surface against the true one, as in the table of PHOTOGRAMMETRY's peers.
+struct SurfaceMeasures {
+  double area_cm2 = 0.0;
+  double mean_mm = 0.0;  ///< of the distances of the whole surface from the truth, by area
+  double median_mm = 0.0;
+  double p95_mm = 0.0;
+  double above_1mm_percent = 0.0;
+  double seen_cm2 = 0.0;                ///< of the truth: seen by 3 or more views
+  double within_half_mm_percent = 0.0;  ///< of that
+  double within_1mm_percent = 0.0;
+};
+
+/// Seen: less than 84 deg off the normal and nothing of the specimen before it.
+Result<SurfaceMeasures> measure_surface(const TriangleMesh& surface, const TriangleMesh& truth,
+                                        std::span<const StereoView> views, int threads);
+
+}  // namespace skullstation

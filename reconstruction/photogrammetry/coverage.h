@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/triangle_mesh.h"
+#include "reconstruction/photogrammetry/depth_maps.h"
+#include "reconstruction/photogrammetry/stereo_view.h"
+
+namespace skullstation {
+
+/// How well each vertex was photographed.
+struct Coverage {
+  std::vector<std::uint8_t> views;      ///< views that see the vertex
+  std::vector<float> ground_sample_mm;  ///< finest size of a photograph's pixel there; 0: unseen
+  std::vector<float> accuracy_mm;       ///< estimated standard error along the normal; 0: unseen
+  double open_edge_mm = 0.0;            ///< length of the surface's border
+};
+
+/// Finds the views that see each vertex (their depth maps lie no more than `depth_gap_mm` before
+/// it) from less than 80 deg off its normal. The standard error takes each of n views' depths as
+/// matched to `match_sd_px` and the angle between the lines of sight that lie farthest apart:
+/// sd = gsd match_sd_px / (2 tan(angle / 2) sqrt(n)) (Kraus 2007, normal case).
+/// \pre the mesh has normals
+Coverage measure_coverage(const TriangleMesh& mesh, std::span<const DepthMap> maps,
+                          std::span<const StereoView> views, double depth_gap_mm,
+                          double match_sd_px, int threads);
+
+/// Vertex colours (sRGB) blended from the views that see each vertex, the frontal and close ones
+/// most, after the views' exposures are made equal: each view's gain in linear light is the median
+/// ratio between what its neighbours see and what it sees.
+/// \pre the mesh has normals
+Colors blend_vertex_colors(const TriangleMesh& mesh, std::span<const DepthMap> maps,
+                           std::span<const StereoView> views, double depth_gap_mm, int threads);
+
+}  // namespace skullstation

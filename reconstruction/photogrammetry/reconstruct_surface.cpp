@@ -1,0 +1,122 @@
+#include "reconstruction/photogrammetry/reconstruct_surface.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "reconstruction/photogrammetry/surface_extraction.h"
+#include "reconstruction/photogrammetry/visual_hull.h"
+
+namespace skullstation {
+
+namespace {
+
+/// Median over the views of a pixel's size at the point that all of them look at.
+double pixel_on_specimen_mm(std::span<const StereoView> views) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const StereoView& view : views) middle += view.centre_mm();
+  middle /= static_cast<double>(views.size());
+  // Where the lines of sight pass each other: nearer than the cameras' own middle for rings seen
+  // from above, so it is searched along them.
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const StereoView& view : views) {
+    const Rigid3 back = view.camera_from_table.inverse();
+    const Eigen::Vector3d direction =
+        (back.rotation * view.camera.ray(0.5 * view.camera.width, 0.5 * view.camera.height))
+            .normalized();
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - direction * direction.transpose();
+    normal += across;
+    right += across * back.translation;
+  }
+  normal += 1e-9 * Eigen::Matrix3d::Identity();
+  right += 1e-9 * middle;
+  const Eigen::Vector3d target = normal.inverse() * right;
+  std::vector<double> sizes;
+  for (const StereoView& view : views) {
+    sizes.push_back((view.centre_mm() - target).norm() / view.camera.fx);
+  }
+  const auto median = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), median, sizes.end());
+  return *median;
+}
+
+}  // namespace
+
+SurfaceOptions SurfaceOptions::of(ReconstructionQuality quality,
+                                  std::span<const StereoView> views) {
+  SurfaceOptions options;
+  options.depth.finest_level = quality == ReconstructionQuality::draft      ? 2
+                               : quality == ReconstructionQuality::standard ? 1
+                                                                            : 0;
+  const double pixel_mm = views.empty() ? 0.25 : pixel_on_specimen_mm(views);
+  const double voxel_pixels = quality == ReconstructionQuality::draft      ? 4.0
+                              : quality == ReconstructionQuality::standard ? 1.9
+                                                                           : 1.4;
+  options.fusion.voxel_mm = std::clamp(pixel_mm * voxel_pixels, 0.05, 20.0);
+  return options;
+}
+
+Result<void> SurfaceOptions::validate() const {
+  if (const auto valid = depth.validate(); !valid) return valid;
+  if (const auto valid = fusion.validate(); !valid) return valid;
+  if (const auto valid = cleaning.validate(); !valid) return valid;
+  if (!(match_sd_px > 0.0)) {
+    return fail(ErrorKind::usage, "surface options", "match_sd_px must be positive");
+  }
+  return {};
+}
+
+Result<ReconstructedSurface> reconstruct_surface(std::span<const StereoView> views,
+                                                 const SurfaceOptions& options,
+                                                 const Progress& progress) {
+  if (const auto valid = options.validate(); !valid) return forward(valid);
+  if (views.size() < 3) {
+    return fail(ErrorKind::bad_input, "views",
+                "a surface takes at least 3 photographs, there are " + std::to_string(views.size()),
+                "take one about every 15 degrees");
+  }
+  for (const StereoView& view : views) {
+    if (view.pass == views.front().pass) continue;
+    return fail(ErrorKind::usage, view.name, "belongs to another pass than the first view",
+                "reconstruct each pass by itself, then join them");
+  }
+  SurfaceOptions stages = options;
+  stages.depth.threads = stages.fusion.threads = options.threads;
+
+  const auto hull = carve_visual_hull(views, stages.depth.hull_resolution, options.threads);
+  if (!hull) return forward(hull);
+  options.after_stage("visual hull");
+  auto maps = compute_depth_maps(views, *hull, stages.depth, progress.part(0.02, 0.85));
+  if (!maps) return forward(maps);
+  options.after_stage("depth maps");
+  FusedSurface surface;
+  {
+    const auto volume = fuse_depth_maps(*maps, views, stages.fusion, progress.part(0.85, 0.93));
+    if (!volume) return forward(volume);
+    options.after_stage("fusion");
+    surface = extract_surface(*volume, stages.fusion.least_weight, options.threads);
+  }
+  surface = without_small_pieces(surface, stages.cleaning);
+  if (surface.mesh.triangles.rows() == 0) {
+    return fail(ErrorKind::no_result, "surface", "the views agree on no surface",
+                "check poses and masks, light and focus");
+  }
+  options.after_stage("surface");
+  ReconstructedSurface result;
+  result.mesh = std::move(surface.mesh);
+  const double gap_mm = stages.fusion.voxel_mm * stages.fusion.truncation_voxels;
+  result.mesh.colors = blend_vertex_colors(result.mesh, *maps, views, gap_mm, options.threads);
+  options.after_stage("colours");
+  const double match_sd_px =
+      options.match_sd_px * static_cast<double>(1 << stages.depth.finest_level);
+  result.coverage =
+      measure_coverage(result.mesh, *maps, views, gap_mm, match_sd_px, options.threads);
+  options.after_stage("coverage");
+  result.depth_maps = *std::move(maps);
+  progress.report(1.0, "surface");
+  return result;
+}
+
+}  // namespace skullstation
