@@ -31,6 +31,7 @@ struct ScoreInput {
   Source sources[8];
 };
 
+void score_portable(const ScoreInput& in, float* costs);
 void score_avx2(const ScoreInput& in, float* costs);
 void score_avx512(const ScoreInput& in, float* costs);
 

@@ -129,8 +129,6 @@ struct PlainGather {
   }
 };
 
-void score_portable(const ScoreInput& in, float* costs) { score_with<PlainGather>(in, costs); }
-
 using Score = void (*)(const ScoreInput&, float*);
 
 Score choose_score() {
@@ -148,6 +146,8 @@ Score choose_score() {
 const Score kScore = choose_score();
 
 }  // namespace
+
+void score_portable(const ScoreInput& in, float* costs) { score_with<PlainGather>(in, costs); }
 
 void score_plane(const Patch& patch, float noise_variance, float x, float y,
                  const InversePlane& plane, const QuadImage* const* images, const PixelWarp* warps,

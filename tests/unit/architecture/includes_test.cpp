@@ -35,6 +35,9 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"reconstruction/volume", {"core", "reconstruction/io"}},
     {"reconstruction/phantom",
      {"core", "reconstruction/io", "reconstruction/distance", "reconstruction/volume"}},
+    {"reconstruction/phantom", {"core", "reconstruction/io", "reconstruction/volume"}},
+    // The phantom's cases of the marching cubes serve here, too.
+    {"reconstruction/photogrammetry", {"core", "core/session", "reconstruction/phantom"}},
     {"daemon", {"daemon/cli", "reconstruction/rendering"}},
     {"daemon/station",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
