@@ -12,22 +12,23 @@ bool confirms(const DepthMap& source, const PixelWarp& to, const PixelWarp& back
   const float z = to.a[6] * x + to.a[7] * y + to.a[8] + to.b[2] * w;
   const float u = (to.a[0] * x + to.a[1] * y + to.a[2] + to.b[0] * w) / z;
   const float v = (to.a[3] * x + to.a[4] * y + to.a[5] + to.b[1] * w) / z;
-  if (!(z > 0.0f && u >= 0.0f && v >= 0.0f)) return false;
+  if (!(z > 0.0f && u >= 0.0f && v >= 0.0f && u < static_cast<float>(source.camera.width) &&
+        v < static_cast<float>(source.camera.height))) {
+    return false;
+  }
   const int column = static_cast<int>(u);
   const int row = static_cast<int>(v);
-  if (column >= source.camera.width || row >= source.camera.height) return false;
   const InversePlane& plane = source.planes[source.index(column, row)];
   if (plane.w == 0.0f) return false;
   const float there =
       plane.at(u - static_cast<float>(column) - 0.5f, v - static_cast<float>(row) - 0.5f);
-  // z / w is the point's depth in the source's camera; the pixel's size there is depth / f.
+  // z / w is the point's depth in the source's camera; the pixel's size there is depth / f. On a
+  // slanted surface, half a pixel aside makes a difference in depth, too.
   const float expected = w / z;
-  const auto limit = static_cast<float>(options.agreement_mm_per_pixel / source.camera.fx);
-  if (!(std::abs(there - expected) <=
-        limit * expected *
-            (1.0f + 3.0f * std::hypot(plane.gx, plane.gy) * static_cast<float>(source.camera.fx) /
-                        plane.w)))
-    return false;
+  const float focal = static_cast<float>(source.camera.fx);
+  const float slope = std::hypot(plane.gx, plane.gy) * focal / plane.w;
+  const float limit = static_cast<float>(options.agreement_mm_per_pixel) / focal * (1.0f + slope);
+  if (!(std::abs(there - expected) <= limit * expected)) return false;
   const float bz = back.a[6] * u + back.a[7] * v + back.a[8] + back.b[2] * there;
   const float bx = (back.a[0] * u + back.a[1] * v + back.a[2] + back.b[0] * there) / bz;
   const float by = (back.a[3] * u + back.a[4] * v + back.a[5] + back.b[1] * there) / bz;

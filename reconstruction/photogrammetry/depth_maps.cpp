@@ -59,6 +59,9 @@ std::vector<Round> plan_rounds(const DepthMapOptions& options) {
   return rounds;
 }
 
+/// About the window's radius: what is smoother than the window only misleads it.
+constexpr double kShadingSd_px = 4.0;
+
 /// All levels of a view but those finer than asked for.
 std::vector<StereoLevel> pyramid_of(const StereoView& view, int finest, int coarsest) {
   std::vector<StereoLevel> levels(coarsest + 1);
@@ -70,8 +73,9 @@ std::vector<StereoLevel> pyramid_of(const StereoView& view, int finest, int coar
       mask = halved(mask);
     }
     if (level < finest) continue;
-    levels[level] = {view.camera.reduced(level), view.camera_from_table, grey, mask,
-                     packed_quads(grey)};
+    const Image8 texture = without_shading(grey, mask, kShadingSd_px);
+    levels[level] = {view.camera.reduced(level), view.camera_from_table, texture, mask,
+                     packed_quads(texture)};
   }
   return levels;
 }

@@ -75,6 +75,11 @@ struct FusedView {
   int mask_scale = 1;  ///< mask pixels per depth pixel
 };
 
+/// Surfaces more than 80 deg aslant are not measured.
+constexpr float kLeastCosine = 0.17f;
+/// How far along its line of sight a depth counts, in truncations.
+constexpr float kLongestReach = 2.0f;
+
 /// How much a depth counts, in (0, 1]: by its correlation and by the views that confirm it.
 float confidence(const DepthMap& map, std::size_t i) {
   const float correlation = std::max(0.05f, 1.0f - map.cost[i]);
@@ -146,11 +151,15 @@ class Integrator {
     const float nz = w - plane.gx * (u - view.cx) - plane.gy * (v - view.cy);
     const float normal = std::sqrt(nx * nx + ny * ny + nz * nz);
     const float distance = (1.0f - w * p.z()) / normal;
-    if (!(distance >= -truncation_)) return;
+    if (!(w > 0.0f && distance >= -truncation_)) return;
     const float ray = std::sqrt(p.x() * p.x() + p.y() * p.y() + p.z() * p.z()) * inverse;
     const float cosine = w / (normal * ray);
-    const float weight = confidence(map, i) * cosine * cosine;
-    if (distance > truncation_) {
+    if (cosine < kLeastCosine) return;
+    const float weight = confidence(map, i) * cosine;
+    // A plane seen nearly edge-on runs on along the line of sight: it holds near its pixel only.
+    const float before = (1.0f / w - p.z()) * ray;
+    if (before < -kLongestReach * truncation_) return;
+    if (distance > truncation_ || before > kLongestReach * truncation_) {
       vote_free(sum, all_weight, weight);
       return;
     }

@@ -39,7 +39,8 @@ struct FusionOptions {
   /// Weight of a view that looks through a point, relative to one that sees the surface there:
   /// what takes out floating pieces and bridges.
   double free_space_weight = 0.3;
-  double least_weight = 0.3;  ///< a grid point counts as seen above it; 1: a confirmed frontal view
+  double least_weight =
+      0.05;  ///< a grid point counts as seen above it; 1: a confirmed frontal view
   int threads = 0;
 
   Result<void> validate() const;

@@ -178,10 +178,12 @@ class Sweeper {
     const float u = (to.a[0] * x + to.a[1] * y + to.a[2] + to.b[0] * w) / z;
     const float v = (to.a[3] * x + to.a[4] * y + to.a[5] + to.b[1] * w) / z;
     const PlaneMap& other = *source_maps_[source];
-    if (!(z > 0.0f && u >= 0.0f && v >= 0.0f)) return most;
+    if (!(z > 0.0f && u >= 0.0f && v >= 0.0f && u < static_cast<float>(other.width) &&
+          v < static_cast<float>(other.height))) {
+      return most;
+    }
     const int column = static_cast<int>(u);
     const int row = static_cast<int>(v);
-    if (column >= other.width || row >= other.height) return most;
     const InversePlane& plane = other.planes[other.index(column, row)];
     if (plane.w == 0.0f) return most;
     const float there = plane.at(u - center(column), v - center(row));

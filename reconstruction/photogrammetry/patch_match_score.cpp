@@ -93,9 +93,17 @@ void PatchMaker::make(const Image8& grey, const Image8& mask, int x, int y, Patc
   const int stride = grey.width;
   const std::uint8_t* centre = grey.row(y) + x;
   const std::uint8_t* inside = mask.row(y) + x;
+  const bool whole = x >= kPatchRadius && y >= kPatchRadius && x < grey.width - kPatchRadius &&
+                     y < grey.height - kPatchRadius;
   float sum = 0.0f;
   float sum_value = 0.0f;
   for (int i = 0; i < kPatchSamples; ++i) {
+    const int u = x + kOffsets[i].x;
+    const int v = y + kOffsets[i].y;
+    if (!whole && (u < 0 || v < 0 || u >= grey.width || v >= grey.height)) {
+      patch.weight[i] = 0.0f;  // beyond the image
+      continue;
+    }
     const int at = kOffsets[i].y * stride + kOffsets[i].x;
     const int level = centre[at];
     const float weight =

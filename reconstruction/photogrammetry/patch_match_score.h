@@ -59,16 +59,15 @@ struct Patch {
 
 struct PatchOptions {
   double spatial_sd_px = 4.0;
-  double color_sd = 30.0;  ///< grey levels of 255
-  double noise_sd = 1.0;   ///< of a grey level: contrast below it says nothing
+  double color_sd = 80.0;  ///< grey levels of 255
+  double noise_sd = 2.0;   ///< of a grey level: contrast below it says nothing
 };
 
 /// Makes patches of one image.
 class PatchMaker {
  public:
   explicit PatchMaker(const PatchOptions& options);
-  /// \pre (x, y) lies kPatchRadius or more inside the image. Pixels where the mask is black don't
-  /// count.
+  /// Pixels beyond the image or where the mask is black don't count. \pre (x, y) is specimen
   void make(const Image8& grey, const Image8& mask, int x, int y, Patch& patch) const;
   float noise_variance() const { return noise_variance_; }
 

@@ -165,6 +165,55 @@ Image8 halved(const Image8& image) {
   return half;
 }
 
+Image8 without_shading(const Image8& grey, const Image8& mask, double blur_sd_px) {
+  const int radius = static_cast<int>(std::ceil(2.5 * blur_sd_px));
+  std::vector<float> kernel(2 * radius + 1);
+  for (int i = -radius; i <= radius; ++i) {
+    kernel[i + radius] = static_cast<float>(std::exp(-0.5 * i * i / (blur_sd_px * blur_sd_px)));
+  }
+  // Sums of weighted grey and of weights, first along the rows, then along the columns.
+  const int width = grey.width;
+  const int height = grey.height;
+  ImageF row_sum(width, height, 1), row_weight(width, height, 1);
+  std::vector<float> value(width + 2 * radius, 0.0f), weight(width + 2 * radius, 0.0f);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      weight[x + radius] = mask.at(x, y);
+      value[x + radius] = weight[x + radius] * grey.at(x, y);
+    }
+    float* const sums = row_sum.row(y);
+    float* const weights = row_weight.row(y);
+    for (int i = 0; i <= 2 * radius; ++i) {
+      for (int x = 0; x < width; ++x) {
+        sums[x] += kernel[i] * value[x + i];
+        weights[x] += kernel[i] * weight[x + i];
+      }
+    }
+  }
+  Image8 texture(width, height, 1, 128);
+  std::vector<float> sum(width), total(width);
+  for (int y = 0; y < height; ++y) {
+    std::fill(sum.begin(), sum.end(), 0.0f);
+    std::fill(total.begin(), total.end(), 0.0f);
+    for (int i = -radius; i <= radius; ++i) {
+      if (y + i < 0 || y + i >= height) continue;
+      const float* const sums = row_sum.row(y + i);
+      const float* const weights = row_weight.row(y + i);
+      const float k = kernel[i + radius];
+      for (int x = 0; x < width; ++x) {
+        sum[x] += k * sums[x];
+        total[x] += k * weights[x];
+      }
+    }
+    for (int x = 0; x < width; ++x) {
+      if (mask.at(x, y) < 64) continue;
+      const float detail = 128.5f + 2.0f * (grey.at(x, y) - sum[x] / total[x]);
+      texture.at(x, y) = static_cast<std::uint8_t>(std::clamp(detail, 0.0f, 255.0f));
+    }
+  }
+  return texture;
+}
+
 Image8 grey_of(const Image8& image) {
   if (image.channels == 1) return image;
   Image8 grey(image.width, image.height, 1);

@@ -52,6 +52,12 @@ Result<StereoView> make_stereo_view(const std::string& name, const Image8& photo
 /// 1-channel image of half the size (rounded down), each pixel the mean of four.
 Image8 halved(const Image8& image);
 
+/// The specimen's fine texture around a mid grey, twice as strong: the image less its own blur
+/// (Gaussian, `blur_sd_px`, over pixels inside the mask only). What is left out is the shading: the
+/// lamps stand still while the specimen turns, so that their light slides over its surface and
+/// looks, on a convex one, as if it lay behind it.
+Image8 without_shading(const Image8& grey, const Image8& mask, double blur_sd_px);
+
 /// Luma of an RGB image (Rec. 601), or the image itself.
 Image8 grey_of(const Image8& image);
 

@@ -23,7 +23,9 @@ TEST(VisualHull, HoldsTheBallAndNotMuchElse) {
         const bool inside = hull->inside[hull->index(x, y, z)] != 0;
         if (inside) volume += hull->voxel_mm * hull->voxel_mm * hull->voxel_mm;
         const double from_surface = (centre - scene.centre_mm).norm() - scene.radius_mm;
-        if (from_surface < 0.0) EXPECT_TRUE(inside) << centre.transpose();
+        if (from_surface < 0.0) {
+          EXPECT_TRUE(inside) << centre.transpose();
+        }
       }
     }
   }
