@@ -6,9 +6,15 @@ namespace skullstation {
 
 namespace {
 
+/// In pixels of the depth maps.
+struct Limits {
+  float back_px = 1.0f;
+  float depth_px = 1.0f;
+};
+
 /// Does the source's own depth confirm that its surface lies where the reference puts it?
 bool confirms(const DepthMap& source, const PixelWarp& to, const PixelWarp& back, float x, float y,
-              float w, const DepthMapOptions& options) {
+              float w, const Limits& limits) {
   const float z = to.a[6] * x + to.a[7] * y + to.a[8] + to.b[2] * w;
   const float u = (to.a[0] * x + to.a[1] * y + to.a[2] + to.b[0] * w) / z;
   const float v = (to.a[3] * x + to.a[4] * y + to.a[5] + to.b[1] * w) / z;
@@ -27,12 +33,12 @@ bool confirms(const DepthMap& source, const PixelWarp& to, const PixelWarp& back
   const float expected = w / z;
   const float focal = static_cast<float>(source.camera.fx);
   const float slope = std::hypot(plane.gx, plane.gy) * focal / plane.w;
-  const float limit = static_cast<float>(options.agreement_mm_per_pixel) / focal * (1.0f + slope);
+  const float limit = limits.depth_px / focal * (1.0f + slope);
   if (!(std::abs(there - expected) <= limit * expected)) return false;
   const float bz = back.a[6] * u + back.a[7] * v + back.a[8] + back.b[2] * there;
   const float bx = (back.a[0] * u + back.a[1] * v + back.a[2] + back.b[0] * there) / bz;
   const float by = (back.a[3] * u + back.a[4] * v + back.a[5] + back.b[1] * there) / bz;
-  return std::hypot(bx - x, by - y) <= static_cast<float>(options.agreement_px);
+  return std::hypot(bx - x, by - y) <= limits.back_px;
 }
 
 }  // namespace
@@ -40,6 +46,9 @@ bool confirms(const DepthMap& source, const PixelWarp& to, const PixelWarp& back
 std::vector<std::uint8_t> count_agreement(std::span<const DepthMap> maps, int reference,
                                           const DepthMapOptions& options) {
   const DepthMap& map = maps[reference];
+  const auto reduction = static_cast<float>(1 << options.finest_level);
+  const Limits limits{static_cast<float>(options.agreement_px) / reduction,
+                      static_cast<float>(options.agreement_depth_px) / reduction};
   std::vector<std::uint8_t> count(map.planes.size(), 0);
   for (const int other : map.sources) {
     const DepthMap& source = maps[other];
@@ -53,7 +62,7 @@ std::vector<std::uint8_t> count_agreement(std::span<const DepthMap> maps, int re
         const float w = map.planes[i].w;
         if (w == 0.0f) continue;
         count[i] += confirms(source, to, back, static_cast<float>(x) + 0.5f,
-                             static_cast<float>(y) + 0.5f, w, options)
+                             static_cast<float>(y) + 0.5f, w, limits)
                         ? 1
                         : 0;
       }

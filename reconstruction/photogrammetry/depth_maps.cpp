@@ -36,7 +36,8 @@ std::vector<Round> plan_rounds(const DepthMapOptions& options) {
       rounds.push_back(search);
     }
     const bool last = level == options.finest_level;
-    for (int i = 0; i < 2; ++i) {
+    const int count = last ? options.finest_rounds : 2;
+    for (int i = 0; i < count; ++i) {
       Round round{level, true, {}};
       SweepOptions sweep;
       sweep.geometric_weight = 0.15;
@@ -46,6 +47,7 @@ std::vector<Round> plan_rounds(const DepthMapOptions& options) {
       // What is too thin for the coarsest level is found on the next.
       sweep.random_trials = level == options.coarsest_level - 1 && i == 0 ? 2 : 0;
       sweep.score_all_sources = level > 0;
+      if (last && count == 1) sweep.parabola_px = 0.35;
       round.sweeps.push_back(sweep);
       if (last && i == 1) {
         sweep.parabola_px = 0.35;
@@ -90,8 +92,9 @@ Result<void> DepthMapOptions::validate() const {
   if (finest_level < 0 || coarsest_level < finest_level || coarsest_level > 5) {
     return refuse("levels go from 0 (the photographs' size) to 5, the finest first");
   }
+  if (finest_rounds < 1 || finest_rounds > 2) return refuse("finest_rounds is 1 or 2");
   if (hull_resolution < 16 || hull_resolution > 512) return refuse("hull_resolution is 16 to 512");
-  if (!(agreement_px > 0.0) || !(agreement_mm_per_pixel > 0.0) || least_agreement < 0 ||
+  if (!(agreement_px > 0.0) || !(agreement_depth_px > 0.0) || least_agreement < 0 ||
       least_agreement > source_views || !(worst_cost > 0.0)) {
     return refuse("the limits of agreement must be positive, least_agreement at most source_views");
   }

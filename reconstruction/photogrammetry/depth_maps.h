@@ -29,12 +29,14 @@ struct DepthMapOptions {
   int source_views = 8;  ///< per view, in [2, 8]
   int finest_level = 0;  ///< 0: the photographs' size, 1: half of it, 2: a quarter
   int coarsest_level = 3;
+  int finest_rounds = 2;      ///< of geometric consistency on the finest level, 1 or 2
   int hull_resolution = 112;  ///< voxels along the longest side
-  /// Confirmation by another view: forward-backward error and difference in depth, at most.
-  double agreement_px = 1.0;
-  double agreement_mm_per_pixel = 1.5;  ///< in units of a pixel's size on the specimen
-  int least_agreement = 2;              ///< views that must confirm a depth
-  double worst_cost = 0.7;              ///< a depth of a higher cost is dropped
+  /// Confirmation by another view: forward-backward error and difference in depth, at most, in
+  /// pixels of the photographs and their size on the specimen.
+  double agreement_px = 2.0;
+  double agreement_depth_px = 3.0;
+  int least_agreement = 2;  ///< views that must confirm a depth
+  double worst_cost = 0.7;  ///< a depth of a higher cost is dropped
   std::uint64_t seed = 1;
   int threads = 0;
 

@@ -47,13 +47,11 @@ double pixel_on_specimen_mm(std::span<const StereoView> views) {
 SurfaceOptions SurfaceOptions::of(ReconstructionQuality quality,
                                   std::span<const StereoView> views) {
   SurfaceOptions options;
-  options.depth.finest_level = quality == ReconstructionQuality::draft      ? 2
-                               : quality == ReconstructionQuality::standard ? 1
-                                                                            : 0;
+  const bool draft = quality == ReconstructionQuality::draft;
+  options.depth.finest_level = draft ? 1 : 0;
+  options.depth.finest_rounds = quality == ReconstructionQuality::standard ? 1 : 2;
   const double pixel_mm = views.empty() ? 0.25 : pixel_on_specimen_mm(views);
-  const double voxel_pixels = quality == ReconstructionQuality::draft      ? 4.0
-                              : quality == ReconstructionQuality::standard ? 1.9
-                                                                           : 1.4;
+  const double voxel_pixels = draft ? 2.5 : 1.6;
   options.fusion.voxel_mm = std::clamp(pixel_mm * voxel_pixels, 0.05, 20.0);
   return options;
 }

@@ -17,9 +17,9 @@
 namespace skullstation {
 
 enum class ReconstructionQuality {
-  draft,     ///< depth at a quarter of the photographs' size: a look at the result
-  standard,  ///< at half their size
-  fine,      ///< at their full size
+  draft,     ///< depth at half the photographs' size: a look at the result
+  standard,  ///< at their full size, followed up once
+  fine,      ///< at their full size, followed up twice
 };
 
 struct SurfaceOptions {

@@ -132,7 +132,7 @@ TEST(ReconstructSurface, MeasuresABall) {
   const BallScene scene;
   const auto views = photograph(scene);
   const SurfaceOptions options = small_options(views);
-  EXPECT_NEAR(options.fusion.voxel_mm, 1.4 * 260.0 / 420.0, 0.05);
+  EXPECT_NEAR(options.fusion.voxel_mm, 1.6 * 260.0 / 420.0, 0.05);
   const auto surface = reconstruct_surface(views, options);
   ASSERT_TRUE(surface) << surface.error().message();
   const auto errors = errors_of(surface->mesh, scene);
