@@ -32,6 +32,9 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"reconstruction/distance", {"core", "reconstruction/io"}},
     {"reconstruction/rendering", {"core"}},
     {"reconstruction/registration", {"core", "reconstruction/distance"}},
+    {"reconstruction/photogrammetry",
+     {"core", "core/session", "reconstruction/io", "reconstruction/distance",
+      "reconstruction/registration"}},
     {"reconstruction/volume", {"core", "reconstruction/io"}},
     {"reconstruction/phantom",
      {"core", "reconstruction/io", "reconstruction/distance", "reconstruction/volume"}},
@@ -50,6 +53,8 @@ const std::map<std::string, std::set<std::string>> allowed = {
       "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/distance",
       "reconstruction/rendering", "reconstruction/volume", "reconstruction/phantom",
       "daemon/station", "daemon/subject"}},
+      "reconstruction/rendering", "reconstruction/photogrammetry", "reconstruction/volume",
+      "reconstruction/phantom", "daemon/station"}},
 };
 
 /// Headers that take seconds to compile: for their own folder only, behind our own plain types.

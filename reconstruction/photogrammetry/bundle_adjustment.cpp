@@ -1,0 +1,390 @@
+#include "reconstruction/photogrammetry/bundle_adjustment.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/units.h"
+
+namespace skullstation {
+
+namespace {
+
+template <class T>
+using Vector3 = Eigen::Matrix<T, 3, 1>;
+
+/// Lens::project() for any scalar.
+template <class T>
+Eigen::Matrix<T, 2, 1> project_opencv(const T* intrinsics, const Vector3<T>& x_camera) {
+  const T x = x_camera.x() / x_camera.z();
+  const T y = x_camera.y() / x_camera.z();
+  const T r2 = x * x + y * y;
+  const T radial = T(1.0) + r2 * (intrinsics[4] + r2 * intrinsics[5]);
+  const T& p1 = intrinsics[6];
+  const T& p2 = intrinsics[7];
+  const T xd = x * radial + T(2.0) * p1 * x * y + p2 * (r2 + T(2.0) * x * x);
+  const T yd = y * radial + p1 * (r2 + T(2.0) * y * y) + T(2.0) * p2 * x * y;
+  return {intrinsics[0] * xd + intrinsics[2], intrinsics[1] * yd + intrinsics[3]};
+}
+
+template <class T>
+Vector3<T> transformed(const T* rotation, const T* translation, const Vector3<T>& x) {
+  const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
+  const Eigen::Map<const Vector3<T>> t(translation);
+  return q * x + t;
+}
+
+/// x_table of a point in the board frame; the unknowns as in BundleAxis.
+template <class T>
+Vector3<T> on_table(const T* axis, const Vector3<T>& x_board) {
+  const Vector3<T> z = Vector3<T>(axis[2], axis[3], T(1.0)).normalized();
+  const Vector3<T> board_x(T(1.0), T(0.0), T(0.0));
+  const Vector3<T> x = (board_x - z * z.x()).normalized();
+  const Vector3<T> y = z.cross(x);
+  const Vector3<T> from_origin = x_board - Vector3<T>(axis[0], axis[1], T(0.0));
+  return {x.dot(from_origin), y.dot(from_origin), z.dot(from_origin)};
+}
+
+template <class T>
+Vector3<T> turned(const T& angle_rad, const Vector3<T>& x) {
+  using std::cos;
+  using std::sin;
+  const T c = cos(angle_rad);
+  const T s = sin(angle_rad);
+  return {c * x.x() - s * x.y(), s * x.x() + c * x.y(), x.z()};
+}
+
+struct CornerResidual {
+  Eigen::Vector3d x_board;
+  Eigen::Vector2d observed_px;
+  double sd_px;
+
+  template <class T>
+  bool operator()(const T* intrinsics, const T* rotation, const T* translation, T* residual) const {
+    const Vector3<T> x = transformed<T>(rotation, translation, x_board.cast<T>());
+    const Eigen::Matrix<T, 2, 1> px = project_opencv<T>(intrinsics, x);
+    residual[0] = (px.x() - observed_px.x()) / sd_px;
+    residual[1] = (px.y() - observed_px.y()) / sd_px;
+    return true;
+  }
+};
+
+/// What is known about a lens beforehand. An exact number has its standard deviation at 1 here
+/// and is held constant by a manifold.
+struct LensPrior {
+  std::array<double, 8> known;
+  std::array<double, 8> sd;
+  double aspect_sd;
+
+  template <class T>
+  bool operator()(const T* intrinsics, T* residual) const {
+    for (std::size_t i = 0; i < 8; ++i) residual[i] = (intrinsics[i] - known[i]) / sd[i];
+    residual[8] = (intrinsics[0] / intrinsics[1] - known[0] / known[1]) / aspect_sd;
+    return true;
+  }
+};
+
+/// Displacement of the reach points between a view's own pose and where its ring has it.
+struct RingResidual {
+  std::array<Eigen::Vector3d, 4> points;
+  double sd_mm;
+
+  template <class T>
+  bool operator()(const T* axis, const T* angle_rad, const T* ring_rotation,
+                  const T* ring_translation, const T* rotation, const T* translation,
+                  T* residual) const {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Vector3<T> x = points[i].cast<T>();
+      const Vector3<T> by_ring = transformed<T>(ring_rotation, ring_translation,
+                                                turned<T>(*angle_rad, on_table<T>(axis, x)));
+      Eigen::Map<Vector3<T>>(residual + 3 * i) =
+          (transformed<T>(rotation, translation, x) - by_ring) / T(sd_mm);
+    }
+    return true;
+  }
+};
+
+struct AngleResidual {
+  double commanded_rad;
+  double sd_rad;
+
+  template <class T>
+  bool operator()(const T* angle_rad, T* residual) const {
+    residual[0] = (*angle_rad - commanded_rad) / sd_rad;
+    return true;
+  }
+};
+
+std::array<double, 8> numbers_of(const Lens& lens) {
+  return {lens.fx, lens.fy, lens.cx, lens.cy, lens.k1, lens.k2, lens.p1, lens.p2};
+}
+
+/// Four points of three coordinates measure six unknowns: their residuals weigh as if they were
+/// six measurements of the standard deviation given.
+const double ring_weight = std::sqrt(0.5);
+
+/// The problem as Ceres holds it. The unknowns live in this object: lenses are copied back by
+/// finish().
+class CeresBundle {
+ public:
+  explicit CeresBundle(BundleProblem& problem) : problem_(problem) {
+    for (const BundleLens& lens : problem.lenses) intrinsics_.push_back(numbers_of(lens.lens));
+  }
+
+  void add_corners(const CharucoBoard& board) {
+    for (BundleView& view : problem_.views) {
+      double* const lens = intrinsics_[static_cast<std::size_t>(view.lens)].data();
+      for (const BoardCorner& corner : view.corners) {
+        ceres_.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<CornerResidual, 2, 8, 4, 3>(new CornerResidual{
+                board.corner(corner.id), corner.position_px, problem_.corner_sd_px}),
+            new ceres::HuberLoss(problem_.huber_sds), lens, rotation(view.camera_from_board),
+            translation(view.camera_from_board));
+      }
+    }
+    for (std::size_t i = 0; i < intrinsics_.size(); ++i) add_lens_prior(i);
+    for (BundleView& view : problem_.views) make_rotation(view.camera_from_board);
+  }
+
+  /// \pre trust.departure_mm > 0
+  void add_rings(const TableTrust& trust, double loss_sds) {
+    for (BundleView& view : problem_.views) {
+      if (view.ring < 0) continue;
+      BundleRing& ring = problem_.rings[static_cast<std::size_t>(view.ring)];
+      BundleAxis& axis = problem_.axes[static_cast<std::size_t>(ring.axis)];
+      ceres_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<RingResidual, 12, 4, 1, 4, 3, 4, 3>(
+              new RingResidual{reach_points(trust.reach_mm), trust.departure_mm / ring_weight}),
+          new ceres::HuberLoss(loss_sds), axis.unknowns.data(), &view.angle_rad,
+          rotation(ring.camera_from_station), translation(ring.camera_from_station),
+          rotation(view.camera_from_board), translation(view.camera_from_board));
+      ceres_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<AngleResidual, 1, 1>(
+              new AngleResidual{view.commanded_rad, radians(trust.angle_sd_deg)}),
+          new ceres::HuberLoss(loss_sds), &view.angle_rad);
+    }
+    for (const BundleView& view : problem_.views) {
+      if (view.ring < 0) continue;
+      make_rotation(problem_.rings[static_cast<std::size_t>(view.ring)].camera_from_station);
+    }
+  }
+
+  void hold_views() {
+    for (BundleView& view : problem_.views) {
+      if (view.ring < 0) continue;
+      make_rotation(view.camera_from_board);
+      ceres_.SetParameterBlockConstant(rotation(view.camera_from_board));
+      ceres_.SetParameterBlockConstant(translation(view.camera_from_board));
+    }
+  }
+
+  bool solve() {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    options.max_num_iterations = 100;
+    options.function_tolerance = 1e-10;
+    options.parameter_tolerance = 1e-10;
+    options.num_threads = 1;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &ceres_, &summary);
+    return summary.IsSolutionUsable();
+  }
+
+  void finish() {
+    for (std::size_t i = 0; i < intrinsics_.size(); ++i) {
+      BundleLens& lens = problem_.lenses[i];
+      lens.lens = Lens::from_params(lens.lens.width, lens.lens.height, LensModel::opencv,
+                                    {intrinsics_[i].begin(), intrinsics_[i].end()});
+    }
+  }
+
+  std::optional<BundleCovariance> covariance();
+
+ private:
+  static double* rotation(Rigid3& pose) { return pose.rotation.coeffs().data(); }
+  static double* translation(Rigid3& pose) { return pose.translation.data(); }
+
+  void make_rotation(Rigid3& pose) {
+    ceres_.SetManifold(rotation(pose), new ceres::EigenQuaternionManifold);
+  }
+
+  void add_lens_prior(std::size_t index) {
+    double* const block = intrinsics_[index].data();
+    if (!ceres_.HasParameterBlock(block)) return;
+    const BundleLens& lens = problem_.lenses[index];
+    LensPrior prior{numbers_of(lens.known), lens.sd, lens.aspect_sd};
+    std::vector<int> exact;
+    for (int i = 0; i < 8; ++i) {
+      double& sd = prior.sd[static_cast<std::size_t>(i)];
+      if (sd > 0.0) continue;
+      exact.push_back(i);
+      sd = 1.0;
+    }
+    if (exact.size() == 8) return ceres_.SetParameterBlockConstant(block);
+    if (!exact.empty()) ceres_.SetManifold(block, new ceres::SubsetManifold(8, exact));
+    ceres_.AddResidualBlock(new ceres::AutoDiffCostFunction<LensPrior, 9, 8>(new LensPrior(prior)),
+                            nullptr, block);
+  }
+
+  BundleProblem& problem_;
+  std::vector<std::array<double, 8>> intrinsics_;
+  ceres::Problem ceres_;
+};
+
+/// The normal equations' inverse; empty if they are singular.
+Eigen::MatrixXd inverse_normal(ceres::Problem& problem, const std::vector<double*>& blocks) {
+  ceres::Problem::EvaluateOptions options;
+  options.parameter_blocks = blocks;
+  options.apply_loss_function = true;
+  ceres::CRSMatrix jacobian;
+  if (!problem.Evaluate(options, nullptr, nullptr, nullptr, &jacobian)) return {};
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(jacobian.num_cols, jacobian.num_cols);
+  for (int row = 0; row < jacobian.num_rows; ++row) {
+    const auto begin = static_cast<std::size_t>(jacobian.rows[static_cast<std::size_t>(row)]);
+    const auto end = static_cast<std::size_t>(jacobian.rows[static_cast<std::size_t>(row) + 1]);
+    for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t j = begin; j < end; ++j) {
+        normal(jacobian.cols[i], jacobian.cols[j]) += jacobian.values[i] * jacobian.values[j];
+      }
+    }
+  }
+  // The unknowns' units differ by orders of magnitude: a unit diagonal makes rank visible.
+  if (!(normal.diagonal().minCoeff() > 0.0)) return {};
+  const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * normal * scale.asDiagonal();
+  const Eigen::LDLT<Eigen::MatrixXd> factor(scaled);
+  constexpr double rank_tolerance = 1e-13;
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > rank_tolerance)) return {};
+  const Eigen::MatrixXd inverse =
+      factor.solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+  return scale.asDiagonal() * inverse * scale.asDiagonal();
+}
+
+std::optional<BundleCovariance> CeresBundle::covariance() {
+  std::vector<double*> blocks;
+  std::map<const double*, int> column;
+  int columns = 0;
+  const auto add = [&](double* block) {
+    if (!ceres_.HasParameterBlock(block) || ceres_.IsParameterBlockConstant(block) ||
+        column.contains(block)) {
+      return;
+    }
+    blocks.push_back(block);
+    column[block] = columns;
+    columns += ceres_.ParameterBlockTangentSize(block);
+  };
+  for (auto& lens : intrinsics_) add(lens.data());
+  for (BundleView& view : problem_.views) {
+    add(rotation(view.camera_from_board));
+    add(translation(view.camera_from_board));
+    add(&view.angle_rad);
+  }
+  for (BundleRing& ring : problem_.rings) {
+    add(rotation(ring.camera_from_station));
+    add(translation(ring.camera_from_station));
+  }
+  for (BundleAxis& axis : problem_.axes) add(axis.unknowns.data());
+  const Eigen::MatrixXd inverse = inverse_normal(ceres_, blocks);
+  if (inverse.size() == 0) return std::nullopt;
+
+  BundleCovariance result;
+  Eigen::VectorXd by_unknown = Eigen::VectorXd::Zero(columns);
+  double distance = 0.0;
+  for (BundleView& view : problem_.views) {
+    const int turn = column.at(rotation(view.camera_from_board));
+    const int shift = column.at(translation(view.camera_from_board));
+    Eigen::Matrix<double, 6, 6> motion;
+    motion << inverse.block<3, 3>(turn, turn), inverse.block<3, 3>(turn, shift),
+        inverse.block<3, 3>(shift, turn), inverse.block<3, 3>(shift, shift);
+    // Ceres's tangent of a quaternion is half the rotation vector.
+    motion.topRows<3>() *= 2.0;
+    motion.leftCols<3>() *= 2.0;
+    result.views.push_back(motion);
+    // |camera - board| = |translation|, the board frame's origin being its middle.
+    const Eigen::Vector3d& t = view.camera_from_board.translation;
+    distance += t.norm();
+    by_unknown.segment<3>(shift) += t.normalized();
+  }
+  result.scale_sd = std::sqrt(by_unknown.dot(inverse * by_unknown)) / distance;
+  for (auto& lens : intrinsics_) {
+    std::array<double, 8>& sd = result.lens_sd.emplace_back();
+    if (!column.contains(lens.data())) continue;
+    const BundleLens& about = problem_.lenses[result.lens_sd.size() - 1];
+    int at = column.at(lens.data());
+    for (std::size_t i = 0; i < 8; ++i) {
+      if (about.sd[i] > 0.0) {
+        sd[i] = std::sqrt(inverse(at, at));
+        ++at;
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+Rigid3 BundleAxis::table_from_board() const {
+  const Eigen::Vector3d origin = on_table<double>(unknowns.data(), {0.0, 0.0, 0.0});
+  Eigen::Matrix3d rotation;
+  for (int i = 0; i < 3; ++i) {
+    rotation.col(i) = on_table<double>(unknowns.data(), Eigen::Vector3d::Unit(i)) - origin;
+  }
+  return {Eigen::Quaterniond(rotation).normalized(), origin};
+}
+
+std::array<Eigen::Vector3d, 4> reach_points(double reach_mm) {
+  // A tetrahedron about the middle of a specimen that stands on the board.
+  const double a = reach_mm / std::sqrt(3.0);
+  const Eigen::Vector3d middle(0.0, 0.0, a);
+  return {middle + Eigen::Vector3d(a, a, a), middle + Eigen::Vector3d(-a, -a, a),
+          middle + Eigen::Vector3d(-a, a, -a), middle + Eigen::Vector3d(a, -a, -a)};
+}
+
+double ring_departure_mm(const BundleProblem& problem, const BundleView& view, double reach_mm) {
+  const BundleRing& ring = problem.rings[static_cast<std::size_t>(view.ring)];
+  const BundleAxis& axis = problem.axes[static_cast<std::size_t>(ring.axis)];
+  const Rigid3 by_ring = ring.camera_from_station * rotation_about_z(degrees(view.angle_rad)) *
+                         axis.table_from_board();
+  double sum = 0.0;
+  for (const Eigen::Vector3d& x : reach_points(reach_mm)) {
+    sum += (view.camera_from_board * x - by_ring * x).squaredNorm();
+  }
+  return std::sqrt(sum / 4.0);
+}
+
+bool adjust_views(BundleProblem& problem, const CharucoBoard& board,
+                  const std::optional<TableTrust>& trust) {
+  CeresBundle bundle(problem);
+  bundle.add_corners(board);
+  if (trust) bundle.add_rings(*trust, 3.0 * std::sqrt(6.0));
+  if (!bundle.solve()) return false;
+  bundle.finish();
+  return true;
+}
+
+bool adjust_rings(BundleProblem& problem, double reach_mm, double loss_mm) {
+  if (std::ranges::none_of(problem.views, [](const BundleView& v) { return v.ring >= 0; })) {
+    return false;
+  }
+  // The commanded angles fix where the station's zero is, and no more than that.
+  constexpr double angle_sd_deg = 5.0;
+  CeresBundle bundle(problem);
+  bundle.add_rings({loss_mm, angle_sd_deg, reach_mm}, 1.0);
+  bundle.hold_views();
+  return bundle.solve();
+}
+
+std::optional<BundleCovariance> covariance_of(BundleProblem& problem, const CharucoBoard& board,
+                                              const std::optional<TableTrust>& trust) {
+  CeresBundle bundle(problem);
+  bundle.add_corners(board);
+  if (trust) bundle.add_rings(*trust, 3.0 * std::sqrt(6.0));
+  return bundle.covariance();
+}
+
+}  // namespace skullstation
