@@ -11,4 +11,11 @@ const char* to_string(ScaleSource source) {
   return "unknown";
 }
 
+Rigid3 PoseResult::table_from_board(int pass) const {
+  for (const TableMotion& motion : table) {
+    if (motion.pass == pass) return motion.table_from_board;
+  }
+  return {};
+}
+
 }  // namespace skullstation

@@ -65,6 +65,7 @@ struct TableMotion {
   double angle_rms_deg = 0.0;   ///< commanded against measured angles
   double departure_mm = 0.0;    ///< typical, at the specimen's size from the axis; noise taken out
   double axis_offset_mm = 0.0;  ///< of the axis from the board's centre
+  Rigid3 table_from_board;
 };
 
 struct PoseResult {
@@ -77,6 +78,9 @@ struct PoseResult {
   double rms_px = 0.0;             ///< over all corners of the views used
   double corner_noise_px = 0.0;    ///< standard deviation of one coordinate
   std::vector<std::string> notes;  ///< sentences that a person should read
+
+  /// Of the pass; the identity where the table's axis is not known.
+  Rigid3 table_from_board(int pass) const;
 };
 
 }  // namespace skullstation

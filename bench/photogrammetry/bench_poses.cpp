@@ -1,0 +1,227 @@
+// Poses and masks of sessions whose truth is known: how far off, how fast.
+//   bench_poses [--masks DIR] SESSION ...   writes every eighth mask to DIR; SESSION: folders as
+//   `skullstation scan` makes them on the simulated station
+//                               (simulation_truth.json), or with true poses and masks in
+//                               session.json
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/session/image_file.h"
+#include "reconstruction/photogrammetry/masks.h"
+#include "reconstruction/photogrammetry/poses_session.h"
+#include "reconstruction/photogrammetry/scale_check.h"
+
+namespace {
+
+using namespace skullstation;
+namespace fs = std::filesystem;
+
+/// Wall and CPU seconds since the last look.
+class StopWatch {
+ public:
+  std::string look() {
+    const auto now = std::chrono::steady_clock::now();
+    const std::clock_t cpu = std::clock();
+    const std::string text = fmt::format("{:6.2f} s wall {:6.2f} s CPU",
+                                         std::chrono::duration<double>(now - wall_).count(),
+                                         static_cast<double>(cpu - cpu_) / CLOCKS_PER_SEC);
+    wall_ = now;
+    cpu_ = cpu;
+    return text;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
+  std::clock_t cpu_ = std::clock();
+};
+
+Rigid3 pose_of(const nlohmann::json& rows) {
+  Eigen::Matrix<double, 3, 4> matrix;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 4; ++c)
+      matrix(r, c) = rows[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+  }
+  return Rigid3::from_matrix(matrix);
+}
+
+/// camera_from_board of every view, as the simulation had it; empty without a truth.
+std::vector<Rigid3> true_poses(const Session& session, const fs::path& folder) {
+  std::vector<Rigid3> poses;
+  const auto bytes = read_file(folder / "simulation_truth.json");
+  if (!bytes) {
+    for (const SessionView& view : session.views) {
+      if (view.camera_from_table) poses.push_back(*view.camera_from_table);
+    }
+    return poses.size() == session.views.size() ? poses : std::vector<Rigid3>{};
+  }
+  const auto truth = nlohmann::json::parse(*bytes);
+  for (const SessionView& view : session.views) {
+    for (const auto& camera : truth["cameras"]) {
+      if (camera["id"] != view.camera) continue;
+      poses.push_back(pose_of(camera["camera_from_station"]) *
+                      rotation_about_z(truth["views"][view.image]["table_angle_deg"]));
+    }
+  }
+  return poses;
+}
+
+/// The rotation about z and shift along z by which the found frame may differ from the true one:
+/// the board lies on the platter a little askew.
+Rigid3 frame_difference(const std::vector<Rigid3>& truth, const PoseResult& found) {
+  double sine = 0.0;
+  double cosine = 0.0;
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  int used = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    if (!found.views[i].used()) continue;
+    const Rigid3 d = truth[i].inverse() * found.views[i].camera_from_table;
+    sine += 2.0 * d.rotation.w() * d.rotation.z();
+    cosine += 1.0 - 2.0 * d.rotation.z() * d.rotation.z();
+    shift += d.translation;
+    ++used;
+  }
+  Rigid3 difference = rotation_about_z(std::atan2(sine, cosine) * 180.0 / M_PI);
+  difference.translation.z() = shift.z() / used;
+  return difference;
+}
+
+void print_accuracy(const std::vector<Rigid3>& truth, const PoseResult& found) {
+  const Rigid3 frame = frame_difference(truth, found);
+  std::vector<Rigid3> true_used;
+  std::vector<Rigid3> found_used;
+  double sum_mm = 0.0;
+  double worst_mm = 0.0;
+  double worst_deg = 0.0;
+  double predicted_mm = 0.0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const ViewPose& view = found.views[i];
+    if (!view.used()) continue;
+    const Rigid3 expected = truth[i] * frame;
+    const double off_mm =
+        (expected.inverse().translation - view.camera_from_table.inverse().translation).norm();
+    sum_mm += off_mm;
+    worst_mm = std::max(worst_mm, off_mm);
+    worst_deg = std::max(worst_deg, rotation_distance_deg(expected, view.camera_from_table));
+    predicted_mm = std::max(predicted_mm, view.position_error_mm);
+    true_used.push_back(expected);
+    found_used.push_back(view.camera_from_table);
+  }
+  const auto scale = scale_between(true_used, found_used, 1.0);
+  fmt::print(
+      "  centres {:.3f} mm mean, {:.3f} mm worst (predicted {:.3f}); rotation {:.4f} deg "
+      "worst; scale {:+.4f} %\n",
+      sum_mm / static_cast<double>(true_used.size()), worst_mm, predicted_mm, worst_deg,
+      100.0 * (scale.value_or(0.0) - 1.0));
+}
+
+void print_masks(const Session& session, const fs::path& folder, const fs::path& masks_folder,
+                 const std::vector<Image8>& photographs, const PoseResult& found) {
+  StopWatch watch;
+  std::vector<MaskView> views;
+  std::vector<std::size_t> index;
+  for (std::size_t i = 0; i < session.views.size(); ++i) {
+    if (!found.views[i].used() || session.views[i].pass != 0) continue;
+    std::size_t camera = 0;
+    while (session.cameras[camera].id != session.views[i].camera) ++camera;
+    const Rigid3& pose = found.views[i].camera_from_table;
+    views.push_back({&photographs[i], found.lenses[camera].lens, pose,
+                     session.board
+                         ? std::optional(pose * found.table_from_board(session.views[i].pass))
+                         : std::nullopt});
+    index.push_back(i);
+  }
+  const auto masks = find_masks(views, session.board ? &*session.board : nullptr);
+  if (!masks) {
+    fmt::print("  masks: {}\n", masks.error().message());
+    return;
+  }
+  fmt::print("  masks of {} views: {}\n", views.size(), watch.look());
+  double sum = 0.0;
+  double worst = 1.0;
+  int compared = 0;
+  for (std::size_t i = 0; i < masks->size(); ++i) {
+    const SessionView& view = session.views[index[i]];
+    if (!(*masks)[i].odd.empty()) fmt::print("  {}: {}\n", view.image, (*masks)[i].odd);
+    if (i % 8 == 0 && !masks_folder.empty()) {
+      const auto name = fmt::format("{}_{}.png", folder.filename().string(), i);
+      if (!write_file_durably(masks_folder / name, encode_png((*masks)[i].mask))) continue;
+    }
+    if (!view.mask) continue;
+    const auto truth = read_image(folder / *view.mask);
+    if (!truth) continue;
+    const double overlap = mask_overlap((*masks)[i].mask, *truth);
+    sum += overlap;
+    worst = std::min(worst, overlap);
+    ++compared;
+  }
+  if (compared > 0) {
+    fmt::print("  mask against truth, intersection over union: {:.4f} mean, {:.4f} worst\n",
+               sum / compared, worst);
+  }
+}
+
+int run_session(const fs::path& folder, const fs::path& masks_folder) {
+  Result<Session> session = read_session(folder);
+  if (!session) {
+    fmt::print(stderr, "{}\n", session.error().message());
+    return 1;
+  }
+  StopWatch watch;
+  const auto photographs = read_photographs(*session, folder, 0);
+  if (!photographs) {
+    fmt::print(stderr, "{}\n", photographs.error().message());
+    return 1;
+  }
+  const std::vector<Rigid3> truth = true_poses(*session, folder);
+  fmt::print("{}: {} views\n  reading: {}\n", folder.string(), session->views.size(), watch.look());
+  for (SessionView& view : session->views) view.camera_from_table.reset();
+  const auto observations = pose_observations(*session, *photographs, 0);
+  fmt::print("  board corners: {}\n", watch.look());
+  const auto found = find_poses(*session, observations, {});
+  if (!found) {
+    fmt::print("  poses: {}\n", found.error().message());
+    return 1;
+  }
+  fmt::print("  poses: {}; {:.3f} px RMS, corner noise {:.3f} px, scale error {:.4f} % (1 sd)\n",
+             watch.look(), found->rms_px, found->corner_noise_px, found->scale_error_percent);
+  for (std::size_t c = 0; c < found->lenses.size(); ++c) {
+    const Lens& lens = found->lenses[c].lens;
+    fmt::print("  lens {}: fx {:.1f} +- {:.1f}, cx {:.1f}, cy {:.1f}, k1 {:.4f}\n",
+               session->cameras[c].id, lens.fx, found->lenses[c].focal_error_px, lens.cx, lens.cy,
+               lens.k1);
+  }
+  for (const TableMotion& table : found->table) {
+    fmt::print("  table, pass {}: angles {:.3f} deg RMS off, departs {:.3f} mm from a rotation\n",
+               table.pass, table.angle_rms_deg, table.departure_mm);
+  }
+  for (const ViewPose& view : found->views) {
+    if (!view.used()) fmt::print("  dropped {}: {}\n", view.name, view.dropped);
+  }
+  if (!truth.empty()) print_accuracy(truth, *found);
+  print_masks(*session, folder, masks_folder, *photographs, *found);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int failed = 0;
+  fs::path masks_folder;
+  for (int i = 1; i < argc; ++i) {
+    if (argv[i] == std::string_view("--masks") && i + 1 < argc) {
+      masks_folder = argv[++i];
+    } else {
+      failed += run_session(argv[i], masks_folder);
+    }
+  }
+  return failed == 0 ? 0 : 1;
+}
