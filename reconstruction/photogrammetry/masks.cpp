@@ -55,6 +55,44 @@ Image8 without_specks(const Image8& mask) {
   return result;
 }
 
+/// The largest connected part and those that are not much smaller: a mandible may lie by itself.
+Image8 large_parts(const Image8& mask) {
+  constexpr double least_share = 0.02;
+  std::vector<int> part(mask.pixels.size(), -1);
+  std::vector<int> sizes;
+  std::vector<int> open;
+  for (std::size_t start = 0; start < part.size(); ++start) {
+    if (mask.pixels[start] == 0 || part[start] >= 0) continue;
+    const int label = static_cast<int>(sizes.size());
+    sizes.push_back(0);
+    part[start] = label;
+    open.push_back(static_cast<int>(start));
+    while (!open.empty()) {
+      const int at = open.back();
+      open.pop_back();
+      ++sizes.back();
+      const int x = at % mask.width;
+      const auto visit = [&](bool exists, int next) {
+        const auto i = static_cast<std::size_t>(next);
+        if (!exists || mask.pixels[i] == 0 || part[i] >= 0) return;
+        part[i] = label;
+        open.push_back(next);
+      };
+      visit(x > 0, at - 1);
+      visit(x + 1 < mask.width, at + 1);
+      visit(at >= mask.width, at - mask.width);
+      visit(at + mask.width < static_cast<int>(part.size()), at + mask.width);
+    }
+  }
+  Image8 kept(mask.width, mask.height, 1);
+  if (sizes.empty()) return kept;
+  const double least = least_share * *std::ranges::max_element(sizes);
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    if (part[i] >= 0 && sizes[static_cast<std::size_t>(part[i])] >= least) kept.pixels[i] = 255;
+  }
+  return kept;
+}
+
 /// The hull's picture with its outline drawn anew: within `band` pixels of it each pixel's own
 /// evidence decides, deeper inside only a whole patch of background makes a hole.
 Image8 drawn_mask(const Image8& silhouette, const Image<MaskEvidence>& evidence) {
@@ -71,12 +109,12 @@ Image8 drawn_mask(const Image8& silhouette, const Image<MaskEvidence>& evidence)
                         (reach.pixels[i] != 0 && evidence.pixels[i] == MaskEvidence::specimen);
     mask.pixels[i] = inside ? 255 : 0;
   }
-  return without_specks(mask);
+  return large_parts(without_specks(mask));
 }
 
 /// Share of the specimen that this view shows and the others' hull does not, or the other way.
 double mismatch_of(const Image8& silhouette, const Image<MaskEvidence>& evidence) {
-  constexpr int tolerance = 3;
+  constexpr int tolerance = 2;
   const Image8 reach = grown(silhouette, tolerance);
   const Image8 core = inverted(grown(inverted(silhouette), tolerance));
   double area = 0.0;

@@ -125,6 +125,7 @@ float backdrop_level(const Image<Tone>& tones, const ImageF& print) {
 struct Print {
   float ink = 0.0F;
   float paper = 255.0F;
+  bool color_known = false;
   float warmth = 0.0F;  ///< of the paper
   float warmth_sd = 0.01F;
 };
@@ -132,35 +133,43 @@ struct Print {
 /// Nothing if too little of the print can be seen.
 std::optional<Print> measured_print(const Image<Tone>& tones, const ImageF& share) {
   std::vector<float> dark;
-  std::vector<float> bright;
   for (std::size_t i = 0; i < share.pixels.size(); ++i) {
     if (share.pixels[i] >= 0.0F && share.pixels[i] < 0.02F) dark.push_back(tones.pixels[i].level);
-    if (share.pixels[i] > 0.9F) bright.push_back(tones.pixels[i].level);
   }
-  if (dark.size() < 100 || bright.size() < 50) return std::nullopt;
+  if (dark.size() < 50) return std::nullopt;
   Print print;
   print.ink = quantile(std::move(dark), 0.2);
+  // Thin white lines fill no whole pixel: what a pixel's white share would be by itself.
+  std::vector<float> bright;
+  for (std::size_t i = 0; i < share.pixels.size(); ++i) {
+    if (share.pixels[i] < 0.4F) continue;
+    bright.push_back(print.ink + (tones.pixels[i].level - print.ink) / share.pixels[i]);
+  }
+  if (bright.size() < 50) return std::nullopt;
   // A specimen hides a part of the paper, the lamps light it unevenly.
   print.paper = std::max(quantile(std::move(bright), 0.6), print.ink + 20.0F);
   // Partly white cells near black squares that show their ink are the board for certain.
   std::vector<float> warmths;
-  for (int y = 3; y + 3 < tones.height; ++y) {
-    for (int x = 3; x + 3 < tones.width; ++x) {
+  constexpr int farthest = 8;
+  for (int y = farthest; y + farthest < tones.height; ++y) {
+    for (int x = farthest; x + farthest < tones.width; ++x) {
       if (!(share.at(x, y) > 0.4F) || tones.at(x, y).level < 50.0F) continue;
-      bool beside_ink = false;
-      bool beside_other = false;
+      int beside_ink = 0;
+      int beside_other = 0;
       for (const auto& [dx, dy] :
-           {std::pair(3, 0), std::pair(-3, 0), std::pair(0, 3), std::pair(0, -3)}) {
-        const float there = share.at(x + dx, y + dy);
-        if (there < 0.0F || there > 0.02F) continue;
-        const bool shows_ink =
-            tones.at(x + dx, y + dy).level < print.ink + 0.25F * (print.paper - print.ink);
-        (shows_ink ? beside_ink : beside_other) = true;
+           {std::pair(1, 0), std::pair(-1, 0), std::pair(0, 1), std::pair(0, -1)}) {
+        int step = 1;
+        while (step <= farthest && share.at(x + step * dx, y + step * dy) > 0.02F) ++step;
+        if (step > farthest || share.at(x + step * dx, y + step * dy) < 0.0F) continue;
+        const bool shows_ink = tones.at(x + step * dx, y + step * dy).level <
+                               print.ink + 0.25F * (print.paper - print.ink);
+        ++(shows_ink ? beside_ink : beside_other);
       }
-      if (beside_ink && !beside_other) warmths.push_back(tones.at(x, y).warmth);
+      if (beside_ink > 0 && beside_other == 0) warmths.push_back(tones.at(x, y).warmth);
     }
   }
-  if (warmths.size() < 50) return std::nullopt;
+  if (warmths.size() < 50) return print;
+  print.color_known = true;
   print.warmth = quantile(warmths, 0.5);
   print.warmth_sd = std::max(0.006F, 0.74F * (quantile(warmths, 0.75) - quantile(warmths, 0.25)));
   return print;
@@ -192,7 +201,7 @@ Image<MaskEvidence> find_mask_evidence(const MaskView& view, const CharucoBoard*
       warmths.push_back(tones.pixels[i].warmth);
     }
   }
-  const bool color_known = seen && warmths.size() > 200;
+  const bool color_known = seen && seen->color_known && warmths.size() >= 30;
   const float specimen_warmth = color_known ? quantile(std::move(warmths), 0.5) : 0.0F;
   const bool color_tells =
       color_known && std::abs(specimen_warmth - seen->warmth) > 4.0F * seen->warmth_sd;
@@ -203,7 +212,9 @@ Image<MaskEvidence> find_mask_evidence(const MaskView& view, const CharucoBoard*
     const bool on_print = !share.empty() && share.pixels[i] >= 0.0F;
     const float behind =
         on_print && seen ? seen->ink + share.pixels[i] * (seen->paper - seen->ink) : backdrop;
-    if (tone.level > 1.3F * behind + surely_before) {
+    if (on_print && !seen && share.pixels[i] >= 0.02F) {
+      said = MaskEvidence::unclear;  // white for all that is known
+    } else if (tone.level > 1.3F * behind + surely_before) {
       said = MaskEvidence::specimen;
     } else if (tone.level < behind + surely_behind && (!on_print || share.pixels[i] < 0.02F)) {
       said = MaskEvidence::background;
