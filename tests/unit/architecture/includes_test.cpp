@@ -32,15 +32,13 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"reconstruction/distance", {"core", "reconstruction/io"}},
     {"reconstruction/rendering", {"core"}},
     {"reconstruction/registration", {"core", "reconstruction/distance"}},
-    {"reconstruction/photogrammetry",
-     {"core", "core/session", "reconstruction/io", "reconstruction/distance",
-      "reconstruction/registration"}},
     {"reconstruction/volume", {"core", "reconstruction/io"}},
     {"reconstruction/phantom",
      {"core", "reconstruction/io", "reconstruction/distance", "reconstruction/volume"}},
-    {"reconstruction/phantom", {"core", "reconstruction/io", "reconstruction/volume"}},
     // The phantom's cases of the marching cubes serve here, too.
-    {"reconstruction/photogrammetry", {"core", "core/session", "reconstruction/phantom"}},
+    {"reconstruction/photogrammetry",
+     {"core", "core/session", "reconstruction/io", "reconstruction/distance",
+      "reconstruction/registration", "reconstruction/phantom"}},
     {"daemon", {"daemon/cli", "reconstruction/rendering"}},
     {"daemon/station",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
@@ -51,10 +49,8 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"daemon/cli",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
       "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/distance",
-      "reconstruction/rendering", "reconstruction/volume", "reconstruction/phantom",
-      "daemon/station", "daemon/subject"}},
       "reconstruction/rendering", "reconstruction/photogrammetry", "reconstruction/volume",
-      "reconstruction/phantom", "daemon/station"}},
+      "reconstruction/phantom", "daemon/station", "daemon/subject"}},
 };
 
 /// Headers that take seconds to compile: for their own folder only, behind our own plain types.
