@@ -70,7 +70,7 @@ TEST(WarpBasis, DisplacementsAreThoseOfItsWarp) {
   Eigen::VectorXd coefficients(basis.size());
   for (double& c : coefficients) c = random.normal();
   const SpaceWarp warp = basis.warp(coefficients);
-  for (const Vector3d p : {Vector3d(10, 20, 30), Vector3d(-50, 0, 20), Vector3d(0, -70, 5)}) {
+  for (const Vector3d& p : {Vector3d(10, 20, 30), Vector3d(-50, 0, 20), Vector3d(0, -70, 5)}) {
     EXPECT_NEAR((warp(p) - p - basis.displacements(p) * coefficients).norm(), 0.0, 0.01);
   }
 }
