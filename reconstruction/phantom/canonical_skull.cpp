@@ -10,9 +10,9 @@
 
 #include "core/units.h"
 #include "reconstruction/phantom/isosurface.h"
-#include "reconstruction/phantom/largest_component.h"
 #include "reconstruction/phantom/sculpture.h"
 #include "reconstruction/phantom/skull_strokes.h"
+#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 

@@ -89,7 +89,7 @@ bool triangulate(const Loop& loop, CubeTriangles& triangles) {
 
 }  // namespace
 
-const std::array<CubeTriangles, 256>& cube_cases() {
+const std::array<CubeTriangles, 256>& solid_cube_cases() {
   static const std::array<CubeTriangles, 256> cases = [] {
     std::array<CubeTriangles, 256> all;
     for (int corners = 0; corners < 256; ++corners) {

@@ -30,6 +30,6 @@ using CubeTriangles = std::vector<std::array<int, 3>>;
 /// cubes of the face see alike, which is what keeps the surface closed (Duerst 1988; Montani,
 /// Scateni & Scopigno 1994). No triangle's side inside the cube joins two edges of one face, so
 /// that a side is never made a second time by the neighbour, which keeps the surface a manifold.
-const std::array<CubeTriangles, 256>& cube_cases();
+const std::array<CubeTriangles, 256>& solid_cube_cases();
 
 }  // namespace skullstation

@@ -164,7 +164,7 @@ class SparseGrid {
         }
       }
       if (!complete) continue;
-      for (const std::array<int, 3>& cut : cube_cases()[inside]) {
+      for (const std::array<int, 3>& cut : solid_cube_cases()[inside]) {
         std::array<int, 3> triangle;
         for (int k = 0; k < 3; ++k) {
           const Eigen::Vector3i start = corner_point(kCubeEdges[cut[k]][0]);

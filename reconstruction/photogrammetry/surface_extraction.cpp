@@ -125,7 +125,7 @@ class Extractor {
             if (cells.distance[i] < 0.0f) inside |= 1 << corner;
           }
           if (!complete || inside == 0 || inside == 255) continue;
-          for (const std::array<int, 3>& cut : cube_cases()[inside]) {
+          for (const std::array<int, 3>& cut : solid_cube_cases()[inside]) {
             piece.triangles.push_back({vertex_on(b, x, y, z, cut[0]), vertex_on(b, x, y, z, cut[1]),
                                        vertex_on(b, x, y, z, cut[2])});
           }

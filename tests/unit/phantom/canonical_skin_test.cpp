@@ -9,7 +9,7 @@
 
 #include "core/random.h"
 #include "reconstruction/phantom/skin_thickness.h"
-#include "tests/unit/phantom/mesh_topology.h"
+#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 namespace {
@@ -34,12 +34,12 @@ double span_mm(const std::string& a, const std::string& b) {
 TEST(CanonicalSkin, IsOneClosedOrientedManifold) {
   const TriangleMesh mesh = canonical_skin(3.0, 1);
   const MeshTopology topology = topology_of(mesh);
-  EXPECT_TRUE(topology.closed_oriented_manifold());
+  EXPECT_TRUE(topology.is_closed_manifold());
   EXPECT_EQ(topology.components, 1);
   EXPECT_EQ(mesh.normals.rows(), mesh.vertices.rows());
   // Head and neck of an adult.
-  EXPECT_GT(enclosed_volume_mm3(mesh), 3.5e6);
-  EXPECT_LT(enclosed_volume_mm3(mesh), 6.5e6);
+  EXPECT_GT(enclosed_volume(mesh), 3.5e6);
+  EXPECT_LT(enclosed_volume(mesh), 6.5e6);
 }
 
 TEST(CanonicalSkin, IsTheSameForAnyNumberOfThreads) {

@@ -10,7 +10,7 @@
 
 #include "core/random.h"
 #include "reconstruction/phantom/isosurface.h"
-#include "tests/unit/phantom/mesh_topology.h"
+#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 namespace {
@@ -25,8 +25,8 @@ const SkullMeshes& coarse_meshes() {
 
 TEST(CanonicalSkull, BothBonesAreClosedOrientedManifolds) {
   for (const TriangleMesh* mesh : {&coarse_meshes().cranium, &coarse_meshes().mandible}) {
-    EXPECT_TRUE(topology_of(*mesh).closed_oriented_manifold());
-    EXPECT_GT(enclosed_volume_mm3(*mesh), 0.0);
+    EXPECT_TRUE(topology_of(*mesh).is_closed_manifold());
+    EXPECT_GT(enclosed_volume(*mesh), 0.0);
   }
 }
 
@@ -139,7 +139,7 @@ TEST(CanonicalSkull, OpeningTheJawLowersTheChin) {
   shape.mandible_opening_deg = 20.0;
   const TriangleMesh open =
       isosurface(*skull_solids(shape).mandible, {.cell_mm = 2.0, .threads = 2});
-  EXPECT_TRUE(topology_of(open).closed_oriented_manifold());
+  EXPECT_TRUE(topology_of(open).is_closed_manifold());
   const double closed_chin = bounding_box(coarse_meshes().mandible).min().z();
   EXPECT_LT(bounding_box(open).min().z(), closed_chin - 15.0);
 }
@@ -163,7 +163,7 @@ TEST(CanonicalSkull, AThickerVaultGrowsInwards) {
 TEST(CanonicalSkull, OneMeshHoldsBothBones) {
   const TriangleMesh mesh = canonical_skull(3.0, 2);
   const MeshTopology topology = topology_of(mesh);
-  EXPECT_TRUE(topology.closed_oriented_manifold());
+  EXPECT_TRUE(topology.is_closed_manifold());
   EXPECT_EQ(topology.components, 2);
   EXPECT_EQ(mesh.normals.rows(), mesh.vertices.rows());
 }

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/random.h"
-#include "tests/unit/phantom/mesh_topology.h"
+#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 namespace {
@@ -37,10 +37,10 @@ TEST(Isosurface, ASphereHasItsAreaVolumeAndTopology) {
   const FormulaSolid sphere([](const Vector3d& p) { return p.norm() - 20.0; }, 20.0);
   const TriangleMesh mesh = isosurface(sphere, {.cell_mm = 1.0, .threads = 1});
   const MeshTopology topology = topology_of(mesh);
-  EXPECT_TRUE(topology.closed_oriented_manifold());
+  EXPECT_TRUE(topology.is_closed_manifold());
   EXPECT_EQ(topology.components, 1);
   EXPECT_EQ(topology.euler_characteristic, 2);
-  EXPECT_NEAR(enclosed_volume_mm3(mesh), 4.0 / 3.0 * std::numbers::pi * 8000.0, 40.0);
+  EXPECT_NEAR(enclosed_volume(mesh), 4.0 / 3.0 * std::numbers::pi * 8000.0, 40.0);
   EXPECT_NEAR(surface_area(mesh), 4.0 * std::numbers::pi * 400.0, 10.0);
   for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
     const Vector3d p = mesh.vertices.row(v);
@@ -54,7 +54,7 @@ TEST(Isosurface, ATorusHasOneHandle) {
       [](const Vector3d& p) { return std::hypot(std::hypot(p.x(), p.y()) - 12.0, p.z()) - 4.0; },
       16.0);
   const MeshTopology topology = topology_of(isosurface(torus, {.cell_mm = 0.8, .threads = 1}));
-  EXPECT_TRUE(topology.closed_oriented_manifold());
+  EXPECT_TRUE(topology.is_closed_manifold());
   EXPECT_EQ(topology.euler_characteristic, 0);
 }
 
@@ -70,7 +70,7 @@ TEST(Isosurface, StaysAManifoldWhereEveryCaseOfTheCubeOccurs) {
   const TriangleMesh mesh =
       isosurface(solid, {.cell_mm = 1.0, .relaxation_steps = 0, .threads = 1});
   EXPECT_GT(mesh.triangles.rows(), 50000);
-  EXPECT_TRUE(topology_of(mesh).closed_oriented_manifold());
+  EXPECT_TRUE(topology_of(mesh).is_closed_manifold());
 }
 
 TEST(Isosurface, IsTheSameForAnyNumberOfThreads) {

@@ -10,7 +10,7 @@
 #include "core/file.h"
 #include "reconstruction/phantom/person_files.h"
 #include "reconstruction/phantom/thickness_table.h"
-#include "tests/unit/phantom/mesh_topology.h"
+#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 namespace {
@@ -69,7 +69,7 @@ TEST(Person, HasTheDrawnMeasuresAndThicknesses) {
   }
   EXPECT_GT(person.bone.least_determinant, 0.2);
   EXPECT_EQ(person.bone.shrinkings, 0);
-  EXPECT_TRUE(topology_of(person.skin).closed_oriented_manifold());
+  EXPECT_TRUE(topology_of(person.skin).is_closed_manifold());
   EXPECT_EQ(person.skin.triangles, maker().make(average_person(Sex::male), 2).skin.triangles);
 }
 
