@@ -94,10 +94,10 @@ Result<void> render(const BenchScene& wanted, const fs::path& folder, int thread
       RenderOptions how;
       how.seed = mix(wanted.seed, session.views.size());
       how.threads = threads;
-      const ImageF light = render_radiance(**scene, *prepared, {&angle_deg, 1}, how);
+      const ImageF light = render_radiance(*(*scene)->placed(), *prepared, {&angle_deg, 1}, how);
       const Image8 photograph =
           develop(light, SensorOptions{}, ExposureSettings{}, mix(how.seed, 1), threads);
-      const ViewTruth truth = render_truth(**scene, *prepared, angle_deg, threads);
+      const ViewTruth truth = render_truth(*(*scene)->placed(), *prepared, angle_deg, threads);
       SessionView view;
       view.image = fmt::format("images/{}_{:03}.png", ring.camera, i);
       view.camera = ring.camera;
