@@ -106,7 +106,7 @@ std::array<std::vector<std::uint8_t>, 256> make_cases() {
 
 }  // namespace
 
-const std::array<std::vector<std::uint8_t>, 256>& cube_cases() {
+const std::array<std::vector<std::uint8_t>, 256>& joining_cube_cases() {
   static const auto cases = make_cases();
   return cases;
 }

@@ -32,6 +32,6 @@ constexpr std::array<CubeEdge, 12> cube_edges = {{{0, 0},
 /// threshold. Made by following the contours on the faces, where corners above the threshold that
 /// face each other across a face are joined; no triangle's side lies across a face, so that
 /// neighbouring cubes never share one that they should not.
-const std::array<std::vector<std::uint8_t>, 256>& cube_cases();
+const std::array<std::vector<std::uint8_t>, 256>& joining_cube_cases();
 
 }  // namespace skullstation

@@ -172,7 +172,7 @@ class Slab {
   }
 
   void make_triangles(Slice& below, Slice& above) {
-    const auto& cases = cube_cases();
+    const auto& cases = joining_cube_cases();
     const std::size_t up = below.index(0, 1) - below.index(0, 0);
     const int width = grid_.size.x();
     for (int j = -1; j < grid_.size.y(); ++j) {

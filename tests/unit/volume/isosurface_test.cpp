@@ -29,7 +29,7 @@ Volume ball(const VoxelGrid& grid, double radius_mm, const Eigen::Vector3d& cent
 TEST(CubeCases, EachPartsItsCornersAlongTheCrossedEdges) {
   for (int corners = 0; corners < 256; ++corners) {
     std::array<int, 12> uses{};
-    for (const int edge : cube_cases()[static_cast<std::size_t>(corners)]) {
+    for (const int edge : joining_cube_cases()[static_cast<std::size_t>(corners)]) {
       ++uses[static_cast<std::size_t>(edge)];
     }
     for (std::size_t e = 0; e < 12; ++e) {
