@@ -13,8 +13,8 @@ namespace skullstation {
 
 namespace {
 
-constexpr int surface_picture_px = 560;
-constexpr int rays_per_pixel = 12;
+constexpr int surface_picture_px = 400;
+constexpr int rays_per_pixel = 3;
 
 struct PlannedSlice {
   const char* name;
