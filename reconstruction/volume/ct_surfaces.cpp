@@ -215,7 +215,7 @@ Result<CtSurfaces> extract_ct_surfaces(Volume volume, const CtSurfaceOptions& op
   SkinField skin = skin_field(
       work.volume, work.coarse, work.head.head, work.streaks,
       {options.skin_hu, options.metal_hu, options.longest_spike_mm, options.seal}, options.threads);
-  surfaces.skin = largest_mesh_component(
+  surfaces.skin = largest_component(
       isosurface(work.volume.grid, skin.hu, options.skin_hu - 0.5, options.threads));
   skin.hu = {};
   if (stopped()) return cancelled();

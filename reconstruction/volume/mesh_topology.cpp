@@ -163,7 +163,7 @@ TriangleMesh submesh(const TriangleMesh& mesh, const std::function<bool(Eigen::I
   return part;
 }
 
-TriangleMesh largest_mesh_component(const TriangleMesh& mesh) {
+TriangleMesh largest_component(const TriangleMesh& mesh) {
   const std::vector<int> component = component_of_triangles(mesh);
   if (component.empty()) return mesh;
   std::vector<double> area(1 + static_cast<std::size_t>(*std::ranges::max_element(component)));

@@ -36,7 +36,7 @@ std::vector<int> component_of_triangles(const TriangleMesh& mesh);
 TriangleMesh submesh(const TriangleMesh& mesh, const std::function<bool(Eigen::Index)>& keep);
 
 /// The connected component with the largest area alone.
-TriangleMesh largest_mesh_component(const TriangleMesh& mesh);
+TriangleMesh largest_component(const TriangleMesh& mesh);
 
 /// Volume that a closed oriented mesh encloses [mm^3]; negative if it is inside out.
 double enclosed_volume(const TriangleMesh& mesh);
