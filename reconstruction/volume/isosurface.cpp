@@ -126,7 +126,7 @@ class Slab {
       for (int i = -1; i <= width; i += row_block) {
         const int end = std::min(width + 1, i + row_block);
         const std::size_t begin = slice.index(i, j);
-        const auto count = static_cast<std::size_t>(end - i + (end <= width ? 1 : 0));
+        const auto count = static_cast<std::size_t>(end - i) + (end <= width ? 1U : 0U);
         const bool has_row_above = j < grid_.size.y();
         const std::uint8_t flag = *slice.above_row(begin);
         if (all_equal(slice.above_row(begin), count, flag) &&
@@ -179,7 +179,7 @@ class Slab {
       for (int i = -1; i < width; i += row_block) {
         const int end = std::min(width, i + row_block);
         const std::size_t begin = below.index(i, j);
-        const auto count = static_cast<std::size_t>(end - i + 1);
+        const auto count = static_cast<std::size_t>(end - i) + 1U;
         const std::uint8_t flag = *below.above_row(begin);
         if (all_equal(below.above_row(begin), count, flag) &&
             all_equal(below.above_row(begin + up), count, flag) &&
