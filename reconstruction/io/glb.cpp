@@ -64,6 +64,25 @@ class GltfBuffer {
     return last();
   }
 
+  int add_coordinates(const std::vector<Eigen::Vector2f>& coordinates) {
+    const std::size_t begin = bytes.size();
+    for (const Eigen::Vector2f& at : coordinates) {
+      append_little_endian(bytes, at.x());
+      append_little_endian(bytes, at.y());
+    }
+    add_accessor(begin, array_buffer, float32, "VEC2",
+                 static_cast<Eigen::Index>(coordinates.size()));
+    return last();
+  }
+
+  /// Index of the buffer view that holds a picture's file.
+  int add_image(const std::string& file) {
+    views.push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", file.size()}});
+    bytes += file;
+    bytes.resize((bytes.size() + 3) / 4 * 4, '\0');
+    return static_cast<int>(views.size()) - 1;
+  }
+
   int add_triangles(const Triangles& triangles) {
     const std::size_t begin = bytes.size();
     for (Eigen::Index i = 0; i < triangles.size(); ++i) {
@@ -101,6 +120,33 @@ void append_chunk(std::string& file, std::uint32_t type, std::string chunk, char
   file += chunk;
 }
 
+json plain_material() {
+  return {{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 0.8}}}};
+}
+
+/// A file of one mesh; `rest` are further members of the glTF object.
+Result<void> write_file(GltfBuffer buffer, const json& mesh, const json& material, json rest,
+                        const std::filesystem::path& path) {
+  json& gltf = rest;
+  gltf["asset"] = {{"version", "2.0"}, {"generator", "skullstation"}};
+  gltf["scene"] = 0;
+  gltf["scenes"] = json::array({{{"nodes", {0}}}});
+  gltf["nodes"] = json::array({{{"mesh", 0}, {"name", path.stem().string()}}});
+  gltf["meshes"] = json::array({mesh});
+  gltf["materials"] = json::array({material});
+  gltf["accessors"] = buffer.accessors;
+  gltf["bufferViews"] = buffer.views;
+  gltf["buffers"] = json::array({{{"byteLength", buffer.bytes.size()}}});
+
+  std::string chunks;
+  append_chunk(chunks, 0x4E4F534A, gltf.dump(), ' ');               // "JSON"
+  append_chunk(chunks, 0x004E4942, std::move(buffer.bytes), '\0');  // "BIN"
+  std::string file = "glTF";
+  append_little_endian(file, std::uint32_t{2});
+  append_little_endian(file, static_cast<std::uint32_t>(12 + chunks.size()));
+  return write_file_durably(path, file + chunks);
+}
+
 }  // namespace
 
 Result<void> write_glb(const TriangleMesh& mesh, const std::filesystem::path& path,
@@ -133,25 +179,46 @@ Result<void> write_glb(const TriangleMesh& mesh, const std::filesystem::path& pa
   }
   mesh_json["primitives"] = json::array({primitive});
 
-  const json material = {
-      {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 0.8}}}};
-  const json gltf = {{"asset", {{"version", "2.0"}, {"generator", "skullstation"}}},
-                     {"scene", 0},
-                     {"scenes", json::array({{{"nodes", {0}}}})},
-                     {"nodes", json::array({{{"mesh", 0}, {"name", path.stem().string()}}})},
-                     {"meshes", json::array({mesh_json})},
-                     {"materials", json::array({material})},
-                     {"accessors", buffer.accessors},
-                     {"bufferViews", buffer.views},
-                     {"buffers", json::array({{{"byteLength", buffer.bytes.size()}}})}};
+  return write_file(std::move(buffer), mesh_json, plain_material(), json::object(), path);
+}
 
-  std::string chunks;
-  append_chunk(chunks, 0x4E4F534A, gltf.dump(), ' ');               // "JSON"
-  append_chunk(chunks, 0x004E4942, std::move(buffer.bytes), '\0');  // "BIN"
-  std::string file = "glTF";
-  append_little_endian(file, std::uint32_t{2});
-  append_little_endian(file, static_cast<std::uint32_t>(12 + chunks.size()));
-  return write_file_durably(path, file + chunks);
+Result<void> write_glb(const TriangleMesh& mesh, const MeshTexture& texture,
+                       const std::filesystem::path& path) {
+  if (mesh.vertices.rows() == 0 || mesh.triangles.rows() == 0) {
+    return fail(ErrorKind::usage, path.string(), "a GLB file can't hold a mesh without triangles");
+  }
+  if (texture.coordinates.size() != static_cast<std::size_t>(mesh.vertices.rows())) {
+    return fail(ErrorKind::usage, path.string(),
+                fmt::format("{} texture coordinates for {} vertices", texture.coordinates.size(),
+                            mesh.vertices.rows()));
+  }
+  const bool png = texture.image.starts_with("\x89PNG");
+  if (!png && !texture.image.starts_with("\xff\xd8")) {
+    return fail(ErrorKind::usage, path.string(), "the texture's picture is neither PNG nor JPEG");
+  }
+  GltfBuffer buffer;
+  json attributes = {{"POSITION", buffer.add_vectors(mesh.vertices, 1e-3)},
+                     {"TEXCOORD_0", buffer.add_coordinates(texture.coordinates)}};
+  if (mesh.normals.rows() == mesh.vertices.rows()) {
+    attributes["NORMAL"] = buffer.add_vectors(mesh.normals, 1.0);
+  }
+  const json primitive = {{"attributes", attributes},
+                          {"indices", buffer.add_triangles(mesh.triangles)},
+                          {"material", 0}};
+  json material = plain_material();
+  material["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
+  // Numbers of the specification: linear filtering, with mipmaps when the picture is small; no
+  // repetition.
+  const json rest = {
+      {"images", json::array({{{"bufferView", buffer.add_image(texture.image)},
+                               {"mimeType", png ? "image/png" : "image/jpeg"}}})},
+      {"samplers",
+       json::array(
+           {{{"magFilter", 9729}, {"minFilter", 9987}, {"wrapS", 33071}, {"wrapT", 33071}}})},
+      {"textures", json::array({{{"source", 0}, {"sampler", 0}}})}};
+  return write_file(std::move(buffer),
+                    {{"name", path.stem().string()}, {"primitives", json::array({primitive})}},
+                    material, rest, path);
 }
 
 }  // namespace skullstation

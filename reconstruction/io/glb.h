@@ -23,4 +23,16 @@ struct MorphTarget {
 Result<void> write_glb(const TriangleMesh& mesh, const std::filesystem::path& path,
                        const std::vector<MorphTarget>& morph_targets = {});
 
+/// A picture laid over a mesh.
+struct MeshTexture {
+  std::vector<Eigen::Vector2f> coordinates;  ///< #V, in [0, 1] from the picture's upper left corner
+  std::string image;                         ///< a PNG or JPEG file's bytes, sRGB
+};
+
+/// The same with a texture instead of vertex colours; the picture goes into the file as it is.
+/// Fails with `usage` for coordinates of another number than the vertices' and for a picture that
+/// is neither PNG nor JPEG.
+Result<void> write_glb(const TriangleMesh& mesh, const MeshTexture& texture,
+                       const std::filesystem::path& path);
+
 }  // namespace skullstation

@@ -283,17 +283,27 @@ Result<TriangleMesh> read_ply(const std::filesystem::path& path) {
   return parse_ply(*bytes, path.string());
 }
 
-Result<void> write_ply(const TriangleMesh& mesh, const std::filesystem::path& path) {
+Result<void> write_ply(const TriangleMesh& mesh, const std::filesystem::path& path,
+                       const std::vector<VertexScalar>& scalars) {
+  std::string scalar_properties;
+  for (const VertexScalar& scalar : scalars) {
+    if (scalar.values.size() != mesh.vertices.rows()) {
+      return fail(ErrorKind::usage, path.string(),
+                  fmt::format("\"{}\" has {} values for {} vertices", scalar.name,
+                              scalar.values.size(), mesh.vertices.rows()));
+    }
+    scalar_properties += fmt::format("property float {}\n", scalar.name);
+  }
   const bool has_normals = mesh.normals.rows() == mesh.vertices.rows() && mesh.normals.rows() > 0;
   const bool has_colors = mesh.colors.rows() == mesh.vertices.rows() && mesh.colors.rows() > 0;
   std::string bytes = fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment units mm\nelement vertex {}\n"
-      "property float x\nproperty float y\nproperty float z\n{}{}"
+      "property float x\nproperty float y\nproperty float z\n{}{}{}"
       "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
       mesh.vertices.rows(),
       has_normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "",
       has_colors ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "",
-      mesh.triangles.rows());
+      scalar_properties, mesh.triangles.rows());
   for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
     for (int axis = 0; axis < 3; ++axis)
       append_little_endian(bytes, static_cast<float>(mesh.vertices(v, axis)));
@@ -303,6 +313,9 @@ Result<void> write_ply(const TriangleMesh& mesh, const std::filesystem::path& pa
     }
     if (has_colors) {
       for (int axis = 0; axis < 3; ++axis) append_little_endian(bytes, mesh.colors(v, axis));
+    }
+    for (const VertexScalar& scalar : scalars) {
+      append_little_endian(bytes, static_cast<float>(scalar.values[v]));
     }
   }
   for (Eigen::Index f = 0; f < mesh.triangles.rows(); ++f) {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/result.h"
 #include "core/triangle_mesh.h"
@@ -18,8 +20,16 @@ Result<TriangleMesh> read_ply(const std::filesystem::path& path);
 /// The same from memory; `name` stands for the file in error messages.
 Result<TriangleMesh> parse_ply(std::string_view bytes, std::string_view name);
 
-/// Binary little endian, float positions [mm], normals and colours where the mesh has them. Whole
-/// or not at all.
-Result<void> write_ply(const TriangleMesh& mesh, const std::filesystem::path& path);
+/// A number for each vertex, a property of its own in the file.
+struct VertexScalar {
+  std::string name;  ///< a word, as PLY wants it
+  Eigen::VectorXd values;
+};
+
+/// Binary little endian, float positions [mm], normals and colours where the mesh has them, then
+/// the scalars as floats. Whole or not at all. Fails with `usage` for scalars of another number
+/// than the vertices'.
+Result<void> write_ply(const TriangleMesh& mesh, const std::filesystem::path& path,
+                       const std::vector<VertexScalar>& scalars = {});
 
 }  // namespace skullstation

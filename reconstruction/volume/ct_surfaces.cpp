@@ -8,12 +8,12 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/volume/coarse_volume.h"
 #include "reconstruction/volume/ct_findings.h"
 #include "reconstruction/volume/head_region.h"
 #include "reconstruction/volume/hounsfield.h"
 #include "reconstruction/volume/isosurface.h"
-#include "reconstruction/volume/mesh_topology.h"
 #include "reconstruction/volume/morphology.h"
 #include "reconstruction/volume/skull_field.h"
 #include "reconstruction/volume/skull_parts.h"
@@ -31,7 +31,7 @@ constexpr double farthest_air_hu = 100.0;
 struct Work {
   Volume volume;
   CoarseVolume coarse;
-  HeadRegion head;
+  HeadVoxels head;
   std::vector<StreakedSlices> streaks;
   std::optional<SpinalCanal> canal;
   std::optional<MandibleExtent> mandible;

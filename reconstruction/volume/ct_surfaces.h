@@ -7,7 +7,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 #include "core/triangle_mesh.h"
-#include "reconstruction/volume/decimation.h"
+#include "reconstruction/mesh/decimation.h"
 #include "reconstruction/volume/skin_field.h"
 #include "reconstruction/volume/volume.h"
 #include "reconstruction/volume/voxel_components.h"

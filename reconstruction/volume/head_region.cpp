@@ -42,7 +42,7 @@ Result<VoxelMask> thick_body(const CoarseVolume& coarse, const VoxelMask& solid,
 }
 
 /// Counts the faces between head and removed voxels.
-void measure_contact(const CoarseVolume& coarse, HeadRegion& region) {
+void measure_contact(const CoarseVolume& coarse, HeadVoxels& region) {
   const Eigen::Vector3i size = region.head.size;
   const Eigen::Vector3d& spacing_mm = coarse.grid.spacing_mm;
   double middle_j = 0.0;
@@ -81,7 +81,7 @@ void measure_contact(const CoarseVolume& coarse, HeadRegion& region) {
 
 }  // namespace
 
-Result<HeadRegion> find_head(const CoarseVolume& coarse, int tissue_hu, int threads) {
+Result<HeadVoxels> find_head(const CoarseVolume& coarse, int tissue_hu, int threads) {
   const VoxelMask tissue = coarse.at_least(tissue_hu);
   const auto body = thick_body(coarse, filled(tissue), threads);
   if (!body) return forward(body);
@@ -117,7 +117,7 @@ Result<HeadRegion> find_head(const CoarseVolume& coarse, int tissue_hu, int thre
                       least_share_of_a_wall * static_cast<double>(parts.all()[part].voxels);
     belongs[part] = touches[part] && (small || wall);
   }
-  HeadRegion region{parts.mask_of(belongs), VoxelMask(tissue.size)};
+  HeadVoxels region{parts.mask_of(belongs), VoxelMask(tissue.size)};
   for (std::size_t v = 0; v < tissue.on.size(); ++v) {
     if (tissue.on[v] == 0) continue;
     if (body->on[v] != 0) region.head.on[v] = 1;

@@ -6,7 +6,7 @@
 namespace skullstation {
 
 /// Which coarse voxels belong to the head and neck, and what was found besides.
-struct HeadRegion {
+struct HeadVoxels {
   VoxelMask head;     ///< coarse voxels of tissue (at least half, roughly) that belong to the head
   VoxelMask removed;  ///< tissue-like voxels that don't: head rest, table, cables, clothes
   double removed_mm3 = 0.0;
@@ -20,6 +20,6 @@ struct HeadRegion {
 /// reach at most 30 mm beyond it, as ears do, where shells and tables reach farther, and those that
 /// are walls round a cavity with a narrow opening, as the nose is. Fails with `no_result` where
 /// there is no such body.
-Result<HeadRegion> find_head(const CoarseVolume& coarse, int tissue_hu, int threads);
+Result<HeadVoxels> find_head(const CoarseVolume& coarse, int tissue_hu, int threads);
 
 }  // namespace skullstation

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/parallel.h"
-#include "reconstruction/volume/cube_cases.h"
+#include "reconstruction/mesh/cube_cases.h"
 
 namespace skullstation {
 
@@ -172,7 +172,7 @@ class Slab {
   }
 
   void make_triangles(Slice& below, Slice& above) {
-    const auto& cases = joining_cube_cases();
+    const CubeCases& cases = cube_cases(DiagonalCorners::are_joined);
     const std::size_t up = below.index(0, 1) - below.index(0, 0);
     const int width = grid_.size.x();
     for (int j = -1; j < grid_.size.y(); ++j) {
@@ -194,12 +194,14 @@ class Slab {
               unsigned{below.above(at + up)} << 2 | unsigned{below.above(at + up + 1)} << 3 |
               unsigned{above.above(at)} << 4 | unsigned{above.above(at + 1)} << 5 |
               unsigned{above.above(at + up)} << 6 | unsigned{above.above(at + up + 1)} << 7;
-          for (const std::uint8_t edge : cases[corner_set]) {
-            const CubeEdge& e = cube_edges[edge];
-            Slice& slice = (e.corner & 4) != 0 ? above : below;
-            const std::size_t shift = static_cast<std::size_t>(e.corner & 1) +
-                                      ((e.corner & 2) != 0 ? up : std::size_t{0});
-            corners.push_back(slice.vertex(e.axis, at + shift));
+          for (const std::array<int, 3>& triangle : cases[corner_set]) {
+            for (const int edge : triangle) {
+              const CubeEdge& e = cube_edges[static_cast<std::size_t>(edge)];
+              Slice& slice = (e.corner & 4) != 0 ? above : below;
+              const std::size_t shift = static_cast<std::size_t>(e.corner & 1) +
+                                        ((e.corner & 2) != 0 ? up : std::size_t{0});
+              corners.push_back(slice.vertex(e.axis, at + shift));
+            }
           }
         }
       }

@@ -19,7 +19,7 @@ constexpr double widest_step_mm = 6.0;
 constexpr double narrowest_canal_mm = 3.5;
 
 /// Soft tissue of the head.
-VoxelMask soft_tissue(const CoarseVolume& coarse, const HeadRegion& head) {
+VoxelMask soft_tissue(const CoarseVolume& coarse, const HeadVoxels& head) {
   VoxelMask soft(coarse.grid.size);
   for (std::size_t v = 0; v < soft.on.size(); ++v) {
     soft.on[v] =
@@ -64,7 +64,7 @@ Eigen::Vector3d SpinalCanal::up() const {
   return along.z() < 10.0 ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d(along.normalized());
 }
 
-std::optional<SpinalCanal> find_spinal_canal(const CoarseVolume& coarse, const HeadRegion& head,
+std::optional<SpinalCanal> find_spinal_canal(const CoarseVolume& coarse, const HeadVoxels& head,
                                              int threads) {
   const VoxelGrid& grid = coarse.grid;
   const VoxelComponents cores(

@@ -26,7 +26,7 @@ struct SpinalCanal {
 /// Finds the brain as the largest region of soft tissue more than 16 mm from bone and air, its
 /// lowest point above the foramen magnum, and follows the canal from there downwards along its
 /// widest places. Nothing if there is no such region: a scan without the cranial cavity.
-std::optional<SpinalCanal> find_spinal_canal(const CoarseVolume& coarse, const HeadRegion& head,
+std::optional<SpinalCanal> find_spinal_canal(const CoarseVolume& coarse, const HeadVoxels& head,
                                              int threads);
 
 }  // namespace skullstation

@@ -89,6 +89,41 @@ TEST(Glb, EveryAccessorLiesInsideTheBufferAndIsAligned) {
   EXPECT_NEAR(number_at<std::uint16_t>(chunks.binary, offset.get<std::size_t>()), 32768, 400);
 }
 
+TEST(Glb, CarriesATextureAsItIs) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh = tetrahedron();
+  MeshTexture texture{{{0.0F, 0.0F}, {1.0F, 0.0F}, {0.25F, 0.75F}, {1.0F, 1.0F}}, "\xff\xd8 jpeg"};
+  ASSERT_TRUE(write_glb(mesh, texture, folder / "skull.glb"));
+  const Chunks chunks = chunks_of(*read_file(folder / "skull.glb"));
+  const auto& json = chunks.json;
+  const auto& attributes = json["meshes"][0]["primitives"][0]["attributes"];
+  const auto& coordinates = json["accessors"][attributes["TEXCOORD_0"].get<int>()];
+  EXPECT_EQ(coordinates["count"], 4);
+  const auto& view = json["bufferViews"][coordinates["bufferView"].get<int>()];
+  const std::size_t third = view["byteOffset"].get<std::size_t>() + 16;
+  EXPECT_EQ(number_at<float>(chunks.binary, third), 0.25F);
+  EXPECT_EQ(number_at<float>(chunks.binary, third + 4), 0.75F);
+  const auto& material = json["materials"][0]["pbrMetallicRoughness"];
+  const auto& used = json["textures"][material["baseColorTexture"]["index"].get<int>()];
+  const auto& image = json["images"][used["source"].get<int>()];
+  EXPECT_EQ(image["mimeType"], "image/jpeg");
+  const auto& bytes = json["bufferViews"][image["bufferView"].get<int>()];
+  EXPECT_EQ(chunks.binary.substr(bytes["byteOffset"].get<std::size_t>(),
+                                 bytes["byteLength"].get<std::size_t>()),
+            texture.image);
+  EXPECT_FALSE(attributes.contains("COLOR_0")) << "it would tint the texture";
+
+  texture.coordinates.pop_back();
+  const auto few = write_glb(mesh, texture, folder / "a.glb");
+  ASSERT_FALSE(few);
+  EXPECT_THAT(few.error().message(), HasSubstr("3 texture coordinates for 4 vertices"));
+  texture.coordinates.emplace_back(0.0F, 0.0F);
+  texture.image = "GIF89a";
+  const auto foreign = write_glb(mesh, texture, folder / "a.glb");
+  ASSERT_FALSE(foreign);
+  EXPECT_THAT(foreign.error().message(), HasSubstr("neither PNG nor JPEG"));
+}
+
 TEST(Glb, WhatCannotBeWrittenIsRefused) {
   const TemporaryFolder folder;
   const auto empty = write_glb(TriangleMesh{}, folder / "a.glb");

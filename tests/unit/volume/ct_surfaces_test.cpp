@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "reconstruction/volume/mesh_topology.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/volume/volume_file.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/volume/analytic_head.h"

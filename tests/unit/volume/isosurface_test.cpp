@@ -5,8 +5,7 @@
 #include <numbers>
 
 #include "core/random.h"
-#include "reconstruction/volume/cube_cases.h"
-#include "reconstruction/volume/mesh_topology.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "tests/unit/volume/analytic_volumes.h"
 
 namespace skullstation {
@@ -24,21 +23,6 @@ Volume ball(const VoxelGrid& grid, double radius_mm, const Eigen::Vector3d& cent
   return sampled(grid, [&](const Eigen::Vector3d& p) {
     return 100.0 * std::clamp(radius_mm - (p - center_mm).norm(), -8.0, 8.0);
   });
-}
-
-TEST(CubeCases, EachPartsItsCornersAlongTheCrossedEdges) {
-  for (int corners = 0; corners < 256; ++corners) {
-    std::array<int, 12> uses{};
-    for (const int edge : joining_cube_cases()[static_cast<std::size_t>(corners)]) {
-      ++uses[static_cast<std::size_t>(edge)];
-    }
-    for (std::size_t e = 0; e < 12; ++e) {
-      const int low = cube_edges[e].corner;
-      const int high = low | 1 << cube_edges[e].axis;
-      const bool crossed = ((corners >> low) & 1) != ((corners >> high) & 1);
-      EXPECT_EQ(uses[e] > 0, crossed) << corners << " edge " << e;
-    }
-  }
 }
 
 TEST(Isosurface, ASphereIsFoundToAFiftiethOfAVoxel) {

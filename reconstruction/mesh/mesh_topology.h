@@ -8,8 +8,6 @@
 
 namespace skullstation {
 
-// Shared by all of reconstruction/: phantoms and registration check their meshes with it.
-
 /// What holds a mesh together.
 struct MeshTopology {
   int components = 0;

@@ -1,9 +1,9 @@
-#include "reconstruction/volume/decimation.h"
+#include "reconstruction/mesh/decimation.h"
 
 #include <gtest/gtest.h>
 
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/volume/isosurface.h"
-#include "reconstruction/volume/mesh_topology.h"
 #include "tests/unit/volume/analytic_volumes.h"
 
 namespace skullstation {

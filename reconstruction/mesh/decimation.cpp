@@ -1,4 +1,4 @@
-#include "reconstruction/volume/decimation.h"
+#include "reconstruction/mesh/decimation.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>

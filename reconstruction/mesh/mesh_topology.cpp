@@ -1,4 +1,4 @@
-#include "reconstruction/volume/mesh_topology.h"
+#include "reconstruction/mesh/mesh_topology.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
