@@ -5,7 +5,8 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
-#include "capture/calibration/reprojection.h"
+#include "core/adjustment/bundle_solver.h"
+#include "core/adjustment/reprojection.h"
 
 namespace skullstation {
 

@@ -10,7 +10,8 @@
 #include <set>
 
 #include "capture/calibration/board_pose.h"
-#include "capture/calibration/reprojection.h"
+#include "core/adjustment/bundle_solver.h"
+#include "core/adjustment/reprojection.h"
 #include "core/units.h"
 
 namespace skullstation {

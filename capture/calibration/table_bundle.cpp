@@ -1,11 +1,13 @@
 #include "capture/calibration/table_bundle.h"
 
 #include <ceres/ceres.h>
+#include <ceres/rotation.h>
 
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "capture/calibration/reprojection.h"
+#include "core/adjustment/bundle_solver.h"
+#include "core/adjustment/reprojection.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -14,26 +16,6 @@ namespace {
 
 template <class T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
-
-/// x_table of a point of the board; the unknowns as in TableAxis.
-template <class T>
-Vector3<T> board_point_on_table(const T* axis, const Vector3<T>& x_board) {
-  const Vector3<T> z = Vector3<T>(axis[2], axis[3], T(1.0)).normalized();
-  const Vector3<T> board_x(T(1.0), T(0.0), T(0.0));
-  const Vector3<T> x = (board_x - z * z.x()).normalized();
-  const Vector3<T> y = z.cross(x);
-  const Vector3<T> from_origin = x_board - Vector3<T>(axis[0], axis[1], T(0.0));
-  return {x.dot(from_origin), y.dot(from_origin), z.dot(from_origin)};
-}
-
-template <class T>
-Vector3<T> turned(const T& angle_rad, const Vector3<T>& x) {
-  using std::cos;
-  using std::sin;
-  const T c = cos(angle_rad);
-  const T s = sin(angle_rad);
-  return {c * x.x() - s * x.y(), s * x.x() + c * x.y(), x.z()};
-}
 
 template <class T>
 void pixel_residual(const Lens& lens, const Vector3<T>& x_camera, const Eigen::Vector2d& observed,
@@ -80,50 +62,7 @@ struct DepartureResidual {
   }
 };
 
-/// The axis that all motions of the board, as a camera saw them, turn about.
-std::optional<TableAxis> first_axis(const std::vector<Rigid3>& motions, double min_turn_deg) {
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  bool turns = false;
-  for (const Rigid3& motion : motions) {
-    Eigen::Vector3d half_sine = motion.rotation.vec();
-    if (half_sine.norm() < std::sin(0.5 * radians(min_turn_deg))) continue;
-    turns = true;
-    // The board lies face up, so that its normal and the axis point to the same side.
-    direction += half_sine.z() < 0.0 ? Eigen::Vector3d(-half_sine) : half_sine;
-    // Points on the axis stay where they are: (I - R) p = t.
-    const Eigen::Matrix3d a = Eigen::Matrix3d::Identity() - motion.rotation.toRotationMatrix();
-    normal += a.transpose() * a;
-    right += a.transpose() * motion.translation;
-  }
-  if (!turns || !(direction.z() > 0.0)) return std::nullopt;
-  direction /= direction.z();
-  // Along the axis nothing is determined: the smallest solution, moved into the board's plane.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(normal);
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  for (int i = 1; i < 3; ++i) {
-    const Eigen::Vector3d v = solver.eigenvectors().col(i);
-    point += v * (v.dot(right) / solver.eigenvalues()[i]);
-  }
-  point -= direction * point.z();
-  return TableAxis{{point.x(), point.y(), direction.x(), direction.y()}};
-}
-
 }  // namespace
-
-Rigid3 TableAxis::table_from_board() const {
-  Rigid3 pose;
-  const Eigen::Vector3d origin = board_point_on_table<double>(unknowns.data(), {0.0, 0.0, 0.0});
-  Eigen::Matrix3d rotation;
-  for (int i = 0; i < 3; ++i) {
-    rotation.col(i) =
-        board_point_on_table<double>(unknowns.data(), Eigen::Vector3d::Unit(i)) - origin;
-  }
-  pose.rotation = Eigen::Quaterniond(rotation).normalized();
-  pose.translation = origin;
-  return pose;
-}
 
 std::optional<TableState> first_table_state(const std::vector<TableObservation>& observations,
                                             const std::vector<Rigid3>& camera_from_board,
@@ -139,7 +78,7 @@ std::optional<TableState> first_table_state(const std::vector<TableObservation>&
                         camera_from_board[i]);
     }
   }
-  const auto axis = first_axis(motions, min_turn_deg);
+  const auto axis = axis_of_motions(motions, min_turn_deg);
   if (!axis) return std::nullopt;
   TableState state;
   state.axis = *axis;

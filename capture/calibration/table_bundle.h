@@ -5,20 +5,12 @@
 #include <optional>
 #include <vector>
 
+#include "core/adjustment/table_axis.h"
 #include "core/session/charuco_board.h"
 #include "core/session/lens.h"
 #include "core/transform.h"
 
 namespace skullstation {
-
-/// Where the turning axis passes through the board: the point on it in the board's plane [mm] and
-/// the direction (x, y, 1), in the board frame. Together with "x along the board's x at angle 0"
-/// this is the board's pose on the platter.
-struct TableAxis {
-  std::array<double, 4> unknowns{};  ///< point x, point y, direction x, direction y
-
-  Rigid3 table_from_board() const;
-};
 
 /// The corners that one camera saw at one stop.
 struct TableObservation {

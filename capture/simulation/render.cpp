@@ -78,11 +78,14 @@ Result<void> RenderOptions::validate() const {
       !std::has_single_bit(static_cast<unsigned>(samples))) {
     return bad("samples", fmt::format("must be a power of two up to {}", SampleTable::points));
   }
-  if (samples_where_uneven < samples || samples_where_uneven > SampleTable::points ||
-      !std::has_single_bit(static_cast<unsigned>(samples_where_uneven))) {
-    return bad("samples_where_uneven",
-               fmt::format("must be a power of two from samples to {}", SampleTable::points));
-  }
+  const auto refines = [&](int more) {
+    return more >= samples && more <= SampleTable::points &&
+           std::has_single_bit(static_cast<unsigned>(more));
+  };
+  const auto must_refine =
+      fmt::format("must be a power of two from samples to {}", SampleTable::points);
+  if (!refines(samples_where_uneven)) return bad("samples_where_uneven", must_refine);
+  if (!refines(samples_at_outlines)) return bad("samples_at_outlines", must_refine);
   if (!(uneven_light >= 0.0)) return bad("uneven_light", "must not be negative");
   return {};
 }
@@ -98,25 +101,30 @@ ImageF render_radiance(const PlacedScene& scene, const PreparedOptics& optics,
   const auto sum_of = [&](int x, int y) -> PixelSum& {
     return sums[static_cast<std::size_t>(y) * lens.width + x];
   };
-  const auto trace_tile = [&](int tile, int count, bool lamps_in_turn, const auto& wanted) {
-    std::vector<PixelSample> samples;
-    tiles.for_pixels(tile, [&](int x, int y) {
-      if (!wanted(x, y)) return;
-      sum_of(x, y) = {};
-      for (int i = 0; i < count; ++i) samples.push_back({x, y, i, count});
-    });
-    if (samples.empty()) return;
+  /// Returns whether any of the samples saw more than the backdrop.
+  const auto trace = [&](std::span<const PixelSample> samples, bool lamps_in_turn) {
     ViewTracer tracer(scene, optics, lamps, lamps_seen, table_angles_deg, options);
     std::vector<TracedSample> traced(samples.size());
     tracer.trace(samples, lamps_in_turn, traced);
+    bool table_seen = false;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       sum_of(samples[i].x, samples[i].y).add(traced[i]);
+      table_seen = table_seen || traced[i].object != SceneObject::backdrop;
     }
+    return table_seen;
   };
 
-  const bool lamps_in_turn = options.samples >= 4;
   parallel_for(tiles.count(), options.threads, [&](int tile) {
-    trace_tile(tile, options.samples, lamps_in_turn, [](int, int) { return true; });
+    std::vector<PixelSample> first;
+    std::vector<PixelSample> others;
+    tiles.for_pixels(tile, [&](int x, int y) {
+      first.push_back({x, y, 0, options.samples});
+      for (int i = 1; i < options.samples; ++i) others.push_back({x, y, i, options.samples});
+    });
+    const bool lamps_in_turn = options.samples >= 4;
+    // The backdrop is smooth: where a tile shows nothing else, one sample of a pixel says all. An
+    // outline just outside the tile has the pixels beside it looked at again below.
+    if (trace(first, lamps_in_turn)) trace(others, lamps_in_turn);
   });
 
   // Again, with more samples, where the first ones disagree, and beside such pixels: there the
@@ -125,28 +133,37 @@ ImageF render_radiance(const PlacedScene& scene, const PreparedOptics& optics,
   std::transform(sums.begin(), sums.end(), uneven.begin(), [&](const PixelSum& sum) {
     return sum.uneven(static_cast<float>(options.uneven_light)) ? 1 : 0;
   });
-  const auto near_uneven = [&](int x, int y) {
+  const auto samples_needed = [&](int x, int y) {
+    const std::uint8_t objects = sum_of(x, y).objects;
+    bool beside_uneven = false;
     for (int j = std::max(0, y - 1); j <= std::min(lens.height - 1, y + 1); ++j) {
       for (int i = std::max(0, x - 1); i <= std::min(lens.width - 1, x + 1); ++i) {
         const std::size_t at = static_cast<std::size_t>(j) * lens.width + i;
-        if (uneven[at] || sums[at].objects != sum_of(x, y).objects) return true;
+        if (!std::has_single_bit(static_cast<std::uint8_t>(sums[at].objects | objects))) {
+          return options.samples_at_outlines;
+        }
+        beside_uneven = beside_uneven || uneven[at] != 0;
       }
     }
-    return false;
+    return beside_uneven ? options.samples_where_uneven : options.samples;
   };
-  if (options.samples_where_uneven > options.samples) {
-    std::vector<char> again(sums.size());
-    parallel_for(lens.height, options.threads, [&](int y) {
-      for (int x = 0; x < lens.width; ++x) {
-        again[static_cast<std::size_t>(y) * lens.width + x] = near_uneven(x, y) ? 1 : 0;
-      }
+  std::vector<std::uint8_t> needed(sums.size());
+  parallel_for(lens.height, options.threads, [&](int y) {
+    for (int x = 0; x < lens.width; ++x) {
+      needed[static_cast<std::size_t>(y) * lens.width + x] =
+          static_cast<std::uint8_t>(samples_needed(x, y));
+    }
+  });
+  parallel_for(tiles.count(), options.threads, [&](int tile) {
+    std::vector<PixelSample> samples;
+    tiles.for_pixels(tile, [&](int x, int y) {
+      const int count = needed[static_cast<std::size_t>(y) * lens.width + x];
+      if (count == options.samples) return;
+      sum_of(x, y) = {};
+      for (int i = 0; i < count; ++i) samples.push_back({x, y, i, count});
     });
-    parallel_for(tiles.count(), options.threads, [&](int tile) {
-      trace_tile(tile, options.samples_where_uneven, false, [&](int x, int y) {
-        return again[static_cast<std::size_t>(y) * lens.width + x] != 0;
-      });
-    });
-  }
+    if (!samples.empty()) trace(samples, false);
+  });
 
   ImageF image(lens.width, lens.height, 3);
   parallel_for(lens.height, options.threads, [&](int y) {

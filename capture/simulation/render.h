@@ -49,8 +49,9 @@ class PreparedOptics {
 
 struct RenderOptions {
   int samples = 4;  ///< per pixel, everywhere: a power of two; textures are filtered to match
-  /// Per pixel at and beside outlines, the edges of shadows and sharp turns of the surface.
-  int samples_where_uneven = 16;
+  int samples_at_outlines = 16;  ///< per pixel at and beside the outline of an object
+  /// Per pixel at and beside the edges of shadows and sharp turns of the surface.
+  int samples_where_uneven = 8;
   /// What counts as a sharp turn: (max - min) / (max + min) of the light on the surface.
   double uneven_light = 0.2;
   std::uint64_t seed = 1;  ///< of the sampling pattern; change it for every view

@@ -290,6 +290,7 @@ double edge_spread_px(const CameraOptics& optics, std::span<const double> table_
   options.threads = 2;
   options.samples = 64;
   options.samples_where_uneven = 64;
+  options.samples_at_outlines = 64;
   const ImageF image = render_radiance(*white_plate()->placed(), testing::prepared(optics),
                                        table_angles_deg, options);
   const std::vector<double> values = profile(image, 0, 60);

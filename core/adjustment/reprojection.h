@@ -1,17 +1,7 @@
 #pragma once
 
-#include <ceres/rotation.h>
-
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <utility>
-#include <vector>
-
-// What the bundle adjustments of this folder share. For .cpp files only: it brings in Ceres.
-
-namespace ceres {
-class Problem;
-}
 
 namespace skullstation {
 
@@ -37,15 +27,5 @@ Eigen::Matrix<T, 3, 1> transformed(const T* rotation, const T* translation,
   const Eigen::Map<const Eigen::Matrix<T, 3, 1>> t(translation);
   return q * x + t;
 }
-
-/// Solves the problem to convergence on one thread, so that the result is the same everywhere.
-/// False if no usable solution was found.
-bool solve_bundle(ceres::Problem& problem);
-
-/// Covariance of the first `count` entries of the listed parameter blocks (tangent space, in the
-/// order of the list) for unit variance of the residuals; empty if they are not determined. The
-/// list names all blocks that are free.
-Eigen::MatrixXd bundle_covariance(ceres::Problem& problem, const std::vector<double*>& blocks,
-                                  Eigen::Index count);
 
 }  // namespace skullstation
