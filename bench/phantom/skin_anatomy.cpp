@@ -18,7 +18,7 @@
 #include "reconstruction/io/mesh_file.h"
 #include "reconstruction/phantom/canonical_skin.h"
 #include "reconstruction/phantom/phantom_ct.h"
-#include "reconstruction/phantom/skin_thickness.h"
+#include "reconstruction/phantom/thickness_table.h"
 #include "reconstruction/volume/ct_surfaces.h"
 
 namespace skullstation {
@@ -35,7 +35,7 @@ void print_depths(const TriangleMesh& skin) {
   const std::vector<Landmark> skins = canonical_skin_landmarks();
   const TriangleBvh surface(skin);
   fmt::print("{:24} {:>8} {:>8} {:>8}   mm\n", "tissue depth", "table", "probed", "closest");
-  for (const TissueDepth& depth : tissue_depths()) {
+  for (const TissueThickness& depth : thickness_table()) {
     const std::string side = depth.bilateral ? " left" : "";
     const Vector3d bone = at(bones, std::string(depth.bone) + side);
     const double probed = (at(skins, std::string(depth.bone) + " skin" + side) - bone).norm();

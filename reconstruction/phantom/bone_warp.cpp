@@ -7,6 +7,7 @@
 
 #include "core/random.h"
 #include "reconstruction/phantom/craniometric_table.h"
+#include "reconstruction/phantom/tissue_targets.h"
 #include "reconstruction/phantom/warp_conditioning.h"
 
 namespace skullstation {
@@ -109,8 +110,18 @@ Rigid3 into_frankfurt_plane(const std::vector<Landmark>& landmarks) {
   return {turn, -(turn * origin)};
 }
 
-BoneWarpModel::BoneWarpModel(std::vector<Landmark> canonical, const TriangleMesh& cranium)
-    : canonical_(std::move(canonical)), basis_(head_box(), bone_basis()) {
+void open_mandible(BoneWarp& bone, double opening_deg) {
+  bone.open_from_closed = mandible_opening(opening_deg);
+  for (std::size_t i = 0; i < bone.landmarks.size(); ++i) {
+    if (!bone.landmarks[i].on_mandible) continue;
+    bone.canonical_mm[i] = bone.open_from_closed * bone.canonical_mm[i];
+    bone.landmarks[i].position_mm = bone.person_from_canonical(bone.canonical_mm[i]);
+  }
+}
+
+BoneWarpModel::BoneWarpModel(std::vector<Landmark> canonical, const TriangleMesh& cranium,
+                             std::vector<Landmark> skin)
+    : canonical_(std::move(canonical)), skin_(std::move(skin)), basis_(head_box(), bone_basis()) {
   for (const ExtremeRule& rule : kExtremes) {
     Extreme extreme;
     extreme.landmark = landmark_index(canonical_, rule.name);
@@ -132,7 +143,8 @@ BoneWarpModel::BoneWarpModel(std::vector<Landmark> canonical, const TriangleMesh
 BoneWarp BoneWarpModel::fit_once(const std::vector<double>& measures_mm,
                                  const VectorXd& start) const {
   std::vector<Vector3d> points = positions(canonical_);
-  std::vector<WarpTarget> targets;
+  std::vector<WarpTarget> targets = tissue_targets(canonical_, skin_);
+  for (const Landmark& landmark : skin_) points.push_back(landmark.position_mm);
   const auto table = craniometric_table();
   for (std::size_t i = 0; i < table.size(); ++i) {
     targets.push_back({shape_measure(table[i], canonical_), measures_mm[i], 0.15});
@@ -159,14 +171,17 @@ BoneWarp BoneWarpModel::fit_once(const std::vector<double>& measures_mm,
       }
     }
   }
+  points.resize(canonical_.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    bone.landmarks.push_back({canonical_[i].name, bone.person_from_canonical(points[i])});
+    bone.landmarks.push_back(
+        {canonical_[i].name, bone.person_from_canonical(points[i]), canonical_[i].on_mandible});
   }
   bone.person_from_canonical.motion = into_frankfurt_plane(bone.landmarks);
   for (Landmark& landmark : bone.landmarks) {
     landmark.position_mm = bone.person_from_canonical.motion * landmark.position_mm;
   }
   bone.measures_mm = craniometrics(bone.landmarks);
+  bone.canonical_mm = std::move(points);
   return bone;
 }
 
@@ -175,6 +190,8 @@ BoneWarp BoneWarpModel::fit(const std::vector<double>& measures_mm, std::uint64_
   Random random(seed);
   VectorXd start(basis_.size());
   for (Eigen::Index i = 0; i < start.size(); ++i) start[i] = freedom * random.normal();
+  // Size and proportions are the measures' to say: chance ones would stretch what is not measured.
+  start.head(WarpBasis::kAffineModes).setZero();
   const std::vector<double> own = craniometrics(canonical_);
   std::vector<double> wanted = measures_mm;
   for (int shrinkings = 0;; ++shrinkings) {

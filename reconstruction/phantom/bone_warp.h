@@ -19,7 +19,10 @@ int landmark_index(const std::vector<Landmark>& landmarks, std::string_view name
 /// A person's skull as a deformation of the canonical one.
 struct BoneWarp {
   SpaceWarp person_from_canonical;  ///< ends in the person's own anatomical frame
+  Rigid3 open_from_closed;          ///< how the canonical mandible is turned before it is warped
   std::vector<Landmark> landmarks;  ///< the person's, in the canonical order
+  /// Where each landmark lies on the canonical skull: extremes are others than the canonical ones.
+  std::vector<Eigen::Vector3d> canonical_mm;
   std::vector<double> measures_mm;  ///< of craniometric_table(), taken from those landmarks
   double least_determinant = 1.0;
   /// How often the draw had to be moved towards the likeliest one until it folded nowhere.
@@ -30,8 +33,11 @@ struct BoneWarp {
 class BoneWarpModel {
  public:
   /// `cranium` is the canonical one, on which landmarks defined as extremes are found anew for
-  /// every person; a mesh of 2 or 3 mm is fine enough.
-  BoneWarpModel(std::vector<Landmark> canonical, const TriangleMesh& cranium);
+  /// every person; a mesh of 2 or 3 mm is fine enough. `skin` are the canonical skin's landmarks:
+  /// the warp also carries the skin, so the likeliest warp is one that, besides, changes the
+  /// thickness of tissue little and leaves nose and mouth where the bone foretells them.
+  BoneWarpModel(std::vector<Landmark> canonical, const TriangleMesh& cranium,
+                std::vector<Landmark> skin);
 
   /// The skull with the given measures [mm] (one each of craniometric_table()) that is nearest to a
   /// draw of the prior deformation: `freedom` times standard normal coefficients from `seed`; with
@@ -51,9 +57,14 @@ class BoneWarpModel {
   BoneWarp fit_once(const std::vector<double>& measures_mm, const Eigen::VectorXd& start) const;
 
   std::vector<Landmark> canonical_;
+  std::vector<Landmark> skin_;
   std::vector<Extreme> extremes_;
   WarpBasis basis_;
 };
+
+/// Turns the mandible, with its landmarks, open by `opening_deg` in [0, 35]. The measures stay
+/// those with the teeth in contact.
+void open_mandible(BoneWarp& bone, double opening_deg);
 
 /// The part of space a head takes up, in the anatomical frame.
 Eigen::AlignedBox3d head_box();

@@ -1,9 +1,9 @@
 #include "reconstruction/phantom/canonical_skin.h"
 
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/phantom/isosurface.h"
 #include "reconstruction/phantom/skin_shape.h"
 #include "reconstruction/phantom/skin_tables.h"
-#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 

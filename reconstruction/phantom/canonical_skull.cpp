@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "core/units.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/phantom/isosurface.h"
 #include "reconstruction/phantom/sculpture.h"
 #include "reconstruction/phantom/skull_strokes.h"
-#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 
@@ -169,9 +169,12 @@ SkullMeshes skull_meshes(const SkullSolids& skull, double edge_mm, int threads) 
 }
 
 TriangleMesh canonical_skull(double edge_mm, int threads) {
-  const SkullMeshes meshes = skull_meshes(skull_solids(), edge_mm, threads);
-  const TriangleMesh& a = meshes.cranium;
-  const TriangleMesh& b = meshes.mandible;
+  return whole_skull(skull_meshes(skull_solids(), edge_mm, threads));
+}
+
+TriangleMesh whole_skull(const SkullMeshes& skull) {
+  const TriangleMesh& a = skull.cranium;
+  const TriangleMesh& b = skull.mandible;
   TriangleMesh mesh;
   mesh.vertices.resize(a.vertices.rows() + b.vertices.rows(), 3);
   mesh.vertices << a.vertices, b.vertices;

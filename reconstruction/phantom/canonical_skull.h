@@ -51,8 +51,10 @@ struct SkullMeshes {
 /// (0: all).
 SkullMeshes skull_meshes(const SkullSolids& skull, double edge_mm, int threads);
 
-/// The canonical skull in one mesh: first the cranium's vertices and triangles, then the
-/// mandible's.
+/// Both bones in one mesh: first the cranium's vertices and triangles, then the mandible's.
+TriangleMesh whole_skull(const SkullMeshes& skull);
+
+/// The canonical skull in one mesh, as whole_skull.
 TriangleMesh canonical_skull(double edge_mm, int threads);
 
 }  // namespace skullstation

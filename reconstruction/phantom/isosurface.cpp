@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/parallel.h"
-#include "reconstruction/phantom/cube_cases.h"
+#include "reconstruction/mesh/cube_cases.h"
 
 namespace skullstation {
 
@@ -164,10 +164,10 @@ class SparseGrid {
         }
       }
       if (!complete) continue;
-      for (const std::array<int, 3>& cut : solid_cube_cases()[inside]) {
+      for (const std::array<int, 3>& cut : cube_cases(DiagonalCorners::stay_apart)[inside]) {
         std::array<int, 3> triangle;
         for (int k = 0; k < 3; ++k) {
-          const Eigen::Vector3i start = corner_point(kCubeEdges[cut[k]][0]);
+          const Eigen::Vector3i start = corner_point(cube_edges[cut[k]].corner);
           const Block* owner = block_of(start);
           const int axis = cut[k] / 4;
           triangle[k] =

@@ -9,15 +9,14 @@ namespace skullstation {
 
 namespace {
 
-/// Fine enough to find extremes and thin places on.
-constexpr double kSearchEdge_mm = 4.0;
+/// Fine enough to have the slit of the mouth.
+constexpr double kSearchEdge_mm = 2.5;
 
-template <class Warp>
-TriangleMesh warped(const TriangleMesh& mesh, const Warp& warp, int threads) {
+template <class Move>
+TriangleMesh moved(const TriangleMesh& mesh, int threads, const Move& move) {
   TriangleMesh result = mesh;
   parallel_for(static_cast<int>(mesh.vertices.rows()), threads, [&](int v) {
-    const Eigen::Vector3d vertex = mesh.vertices.row(v);
-    result.vertices.row(v) = warp(vertex).transpose();
+    result.vertices.row(v) = move(v, mesh.vertices.row(v).transpose()).transpose();
   });
   result.normals = vertex_normals(result);
   return result;
@@ -26,22 +25,32 @@ TriangleMesh warped(const TriangleMesh& mesh, const Warp& warp, int threads) {
 }  // namespace
 
 PersonMaker::PersonMaker(double edge_mm, int threads)
-    : skull_(canonical_skull(edge_mm, threads)),
+    : PersonMaker(skull_meshes(skull_solids(), edge_mm, threads), edge_mm, threads) {}
+
+PersonMaker::PersonMaker(const SkullMeshes& skull, double edge_mm, int threads)
+    : skull_(whole_skull(skull)),
+      cranium_vertices_(skull.cranium.vertices.rows()),
       skin_(canonical_skin(edge_mm, threads)),
-      bone_model_(canonical_landmarks(), skull_),
-      face_model_(canonical_skin_landmarks(), canonical_skin(kSearchEdge_mm, threads), skull_) {}
+      bone_model_(canonical_landmarks(), skull.cranium, canonical_skin_landmarks()),
+      face_model_(skull, canonical_landmarks(), canonical_skin(kSearchEdge_mm, threads),
+                  canonical_skin_landmarks()) {}
 
 Person PersonMaker::make(const PersonParameters& parameters, int threads) const {
   Person person;
   person.parameters = parameters;
   person.bone = bone_model_.fit(parameters.craniometrics_mm, parameters.seed,
                                 parameters.bone_freedom, threads);
+  open_mandible(person.bone, parameters.mandible_opening_deg);
+  person.face = face_model_.fit(parameters, person.bone, threads);
   const SpaceWarp& bone = person.bone.person_from_canonical;
-  person.skull = warped(skull_, bone, threads);
-  person.face = face_model_.fit(parameters, person.bone, person.skull, threads);
-  const SpaceWarp& face = person.face.person_from_carried;
-  person.skin = warped(
-      skin_, [&](const Eigen::Vector3d& point) { return face(bone(point)); }, threads);
+  const SpaceWarp& face = person.face.face_from_canonical;
+  const Rigid3& opening = person.bone.open_from_closed;
+  person.skull = moved(skull_, threads, [&](int v, const Eigen::Vector3d& vertex) {
+    return bone(v < cranium_vertices_ ? vertex : opening * vertex);
+  });
+  person.cranium_vertices = cranium_vertices_;
+  person.skin =
+      moved(skin_, threads, [&](int, const Eigen::Vector3d& vertex) { return bone(face(vertex)); });
   return person;
 }
 

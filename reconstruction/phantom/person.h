@@ -16,6 +16,7 @@ struct Person {
   BoneWarp bone;
   FaceWarp face;
   TriangleMesh skull;  ///< both bones: the cranium's vertices and triangles, then the mandible's
+  Eigen::Index cranium_vertices = 0;
   TriangleMesh skin;
 };
 
@@ -29,7 +30,10 @@ class PersonMaker {
   Person make(const PersonParameters& parameters, int threads) const;
 
  private:
+  PersonMaker(const SkullMeshes& skull, double edge_mm, int threads);
+
   TriangleMesh skull_;
+  Eigen::Index cranium_vertices_ = 0;
   TriangleMesh skin_;
   BoneWarpModel bone_model_;
   FaceWarpModel face_model_;

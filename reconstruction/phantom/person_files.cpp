@@ -69,6 +69,8 @@ std::string truth_json(const Person& person) {
               {"sex", sex_name(parameters.sex)},
               {"age_years", parameters.age_years},
               {"bmi", parameters.bmi},
+              {"mandible_opening_deg", parameters.mandible_opening_deg},
+              {"cranium_vertices", person.cranium_vertices},
               {"bone_freedom", parameters.bone_freedom},
               {"tissue_freedom", parameters.tissue_freedom},
               {"craniometrics", measures},

@@ -36,11 +36,11 @@ std::vector<double> draw_craniometrics(Sex sex, Random& random) {
   return measures;
 }
 
-/// Neighbours in the table are neighbours in the face, so a residual goes halfway with the one
+/// Neighbours in the table are neighbours in the face, so a residual goes mostly with the one
 /// before it; of one landmark the two sides agree to 0.9.
 std::vector<ThicknessPair> draw_thicknesses(const PersonParameters& person, double adiposity,
                                             Random& random) {
-  constexpr double kWithNeighbour = 0.5;
+  constexpr double kWithNeighbour = 0.7;
   constexpr double kWithOtherSide = 0.9;
   const double male = person.sex == Sex::male ? 1.0 : -1.0;
   const double age = (person.age_years - kMeanAge_years) / kAgeSd_years;

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "reconstruction/phantom/canonical_skin.h"
-#include "reconstruction/phantom/skin_thickness.h"
+#include "reconstruction/phantom/thickness_table.h"
 
 namespace skullstation {
 
@@ -105,7 +105,7 @@ std::vector<Landmark> canonical_skin_landmarks() {
   const std::unique_ptr<ImplicitSolid> skin = skin_solid();
   const std::vector<Landmark> skull = canonical_landmarks();
   std::vector<Landmark> landmarks;
-  for (const TissueDepth& depth : tissue_depths()) {
+  for (const TissueThickness& depth : thickness_table()) {
     const std::string bone_name = std::string(depth.bone) + (depth.bilateral ? " left" : "");
     const auto bone = std::ranges::find(skull, bone_name, &Landmark::name);
     const Vector3d direction = Vector3d(depth.direction).normalized();

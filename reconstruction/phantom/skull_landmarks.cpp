@@ -240,8 +240,8 @@ std::vector<Landmark> canonical_landmarks(const SkullShape& shape) {
     const Vector3d left = find(solid, rule);
     const auto add = [&](double side, std::string_view suffix) {
       const Vector3d point(side * left.x(), left.y(), left.z());
-      landmarks.push_back(
-          {std::string(rule.name).append(suffix), on_mandible ? opening * point : point});
+      landmarks.push_back({std::string(rule.name).append(suffix),
+                           on_mandible ? opening * point : point, on_mandible});
     };
     if (rule.bilateral) {
       add(1.0, " left");

@@ -12,6 +12,7 @@ namespace skullstation {
 struct Landmark {
   std::string name;
   Eigen::Vector3d position_mm;
+  bool on_mandible = false;
 };
 
 /// The landmarks of the skull of the given shape, on its surface, in the anatomical frame [mm];

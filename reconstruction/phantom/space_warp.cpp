@@ -11,29 +11,77 @@ namespace skullstation {
 
 namespace {
 
-/// Beyond this many widths a bump moves nothing by a hundred thousandth of its height.
-constexpr double kReach = 4.8;
+constexpr int kMostNodes = 64;  ///< along an axis of a grid
+
+/// A grid's bump heights along the three axes at a point.
+struct Heights {
+  Heights(const BumpGrid& grid, const Eigen::Vector3d& point) {
+    const double factor = -0.5 / (grid.width_mm * grid.width_mm);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int i = 0; i < grid.size[axis]; ++i) {
+        const double off = point[axis] - grid.origin_mm[axis] - i * grid.spacing_mm;
+        along[axis][i] = std::exp(factor * off * off);
+      }
+    }
+  }
+  double along[3][kMostNodes];
+};
+
+Eigen::Vector3d displacement(const BumpGrid& grid, const Eigen::Vector3d& point) {
+  const Heights heights(grid, point);
+  const double* node = grid.displacement_mm.data();
+  double x = 0.0;
+  double y = 0.0;
+  double z = 0.0;
+  for (int k = 0; k < grid.size.z(); ++k) {
+    for (int j = 0; j < grid.size.y(); ++j) {
+      const double across = heights.along[1][j] * heights.along[2][k];
+      for (int i = 0; i < grid.size.x(); ++i, node += 3) {
+        const double height = across * heights.along[0][i];
+        x += height * node[0];
+        y += height * node[1];
+        z += height * node[2];
+      }
+    }
+  }
+  return {x, y, z};
+}
+
+Eigen::Matrix3d slope(const BumpGrid& grid, const Eigen::Vector3d& point) {
+  const Heights heights(grid, point);
+  const double width2 = grid.width_mm * grid.width_mm;
+  Eigen::Matrix3d slope = Eigen::Matrix3d::Zero();
+  Eigen::Index node = 0;
+  for (int k = 0; k < grid.size.z(); ++k) {
+    for (int j = 0; j < grid.size.y(); ++j) {
+      const double across = heights.along[1][j] * heights.along[2][k];
+      for (int i = 0; i < grid.size.x(); ++i, ++node) {
+        const Eigen::Vector3d offset =
+            point - grid.origin_mm - grid.spacing_mm * Eigen::Vector3d(i, j, k);
+        slope -= across * heights.along[0][i] / width2 * grid.displacement_mm.col(node) *
+                 offset.transpose();
+      }
+    }
+  }
+  return slope;
+}
 
 }  // namespace
 
+Eigen::VectorXd BumpGrid::heights(int axis, const Eigen::Vector3d& point) const {
+  const Heights heights(*this, point);
+  return Eigen::Map<const Eigen::VectorXd>(heights.along[axis], size[axis]);
+}
+
 Eigen::Vector3d SpaceWarp::operator()(const Eigen::Vector3d& point) const {
   Eigen::Vector3d warped = point + stretch * point + shift_mm;
-  for (const Bump& bump : bumps) {
-    const double ratio2 = (point - bump.center_mm).squaredNorm() / (bump.width_mm * bump.width_mm);
-    if (ratio2 < kReach * kReach) warped += std::exp(-0.5 * ratio2) * bump.displacement_mm;
-  }
+  for (const BumpGrid& grid : bumps) warped += displacement(grid, point);
   return motion * warped;
 }
 
 Eigen::Matrix3d SpaceWarp::jacobian(const Eigen::Vector3d& point) const {
   Eigen::Matrix3d jacobian = Eigen::Matrix3d::Identity() + stretch;
-  for (const Bump& bump : bumps) {
-    const Eigen::Vector3d offset = point - bump.center_mm;
-    const double width2 = bump.width_mm * bump.width_mm;
-    const double ratio2 = offset.squaredNorm() / width2;
-    if (ratio2 >= kReach * kReach) continue;
-    jacobian -= std::exp(-0.5 * ratio2) / width2 * bump.displacement_mm * offset.transpose();
-  }
+  for (const BumpGrid& grid : bumps) jacobian += slope(grid, point);
   return motion.rotation * jacobian;
 }
 

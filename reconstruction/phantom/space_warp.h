@@ -9,20 +9,28 @@
 
 namespace skullstation {
 
+/// Gaussian bumps of one width on a cubic grid: node (i, j, k) lies at origin + spacing (i, j, k).
+/// A Gaussian is the product of one along each axis, so that a whole grid is summed with as many
+/// exponentials as it has nodes along its axes.
+struct BumpGrid {
+  Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();
+  double spacing_mm = 1.0;
+  double width_mm = 1.0;                           ///< standard deviation
+  Eigen::Vector3i size = Eigen::Vector3i::Zero();  ///< nodes along each axis, at most 64
+  Eigen::Matrix3Xd displacement_mm;                ///< of every node, i fastest
+
+  /// The bumps' heights of one at `point`, along one axis.
+  Eigen::VectorXd heights(int axis, const Eigen::Vector3d& point) const;
+};
+
 /// A smooth deformation of space: an affine map, Gaussian bumps of displacement, and a rigid
 /// motion of the result:
 ///   warped(x) = motion * (x + A x + b + sum_i w_i exp(-|x - c_i|^2 / (2 s_i^2))).
 /// Invertible where the bumps are gentle; see least_determinant.
 struct SpaceWarp {
-  struct Bump {
-    Eigen::Vector3d center_mm = Eigen::Vector3d::Zero();
-    double width_mm = 1.0;  ///< s
-    Eigen::Vector3d displacement_mm = Eigen::Vector3d::Zero();
-  };
-
   Eigen::Matrix3d stretch = Eigen::Matrix3d::Zero();  ///< A
   Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();
-  std::vector<Bump> bumps;
+  std::vector<BumpGrid> bumps;
   Rigid3 motion;  ///< target_from_warped
 
   Eigen::Vector3d operator()(const Eigen::Vector3d& point) const;

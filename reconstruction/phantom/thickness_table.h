@@ -13,6 +13,7 @@ struct TissueThickness {
   bool bilateral;
   double mean_mm;
   double sd_mm;
+  double direction[3];  ///< from bone to skin, on the left side; of any length
   /// Correlation of the thickness (of its logarithm) with the adiposity factor, with being male,
   /// with age.
   double with_adiposity;
@@ -20,10 +21,11 @@ struct TissueThickness {
   double with_age;
 };
 
-/// Means and SDs: pooled adults, T-Table of Hona & Stephan 2024, as transcribed to half a
-/// millimetre by a second hand. The correlations are our own assumption, in the order that De Greef
-/// et al. 2009 and Shui et al. 2016 report: fatness leads, most at cheek and jaw; men's tissue is a
-/// little thicker; age matters least.
+/// Directions are those in which the landmarks are customarily probed: along the skin's normal, in
+/// the sagittal plane for median ones. Means and SDs: pooled adults, T-Table of Hona & Stephan
+/// 2024, as transcribed to half a millimetre by a second hand. The correlations are our own
+/// assumption, in the order that De Greef et al. 2009 and Shui et al. 2016 report: fatness leads,
+/// most at cheek and jaw; men's tissue is a little thicker; age matters least.
 std::span<const TissueThickness> thickness_table();
 
 }  // namespace skullstation

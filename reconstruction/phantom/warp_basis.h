@@ -33,6 +33,8 @@ class WarpBasis {
  public:
   WarpBasis(const Eigen::AlignedBox3d& box, const WarpBasisOptions& options);
 
+  static constexpr int kAffineModes = 12;  ///< the first coefficients are those of the affine part
+
   int size() const { return static_cast<int>(modes_.size()); }
   /// 3 x size: displacement of the point for each coefficient of one.
   Eigen::Matrix3Xd displacements(const Eigen::Vector3d& point) const;
@@ -40,8 +42,9 @@ class WarpBasis {
 
  private:
   struct Mode {
-    int bump = -1;       ///< index of the center (its mirror image has the next), or -1: affine
-    bool alone = false;  ///< a bump in the midsagittal plane, which has no mirror image
+    int grid = -1;            ///< of bumps_, or -1: affine
+    Eigen::Index node = 0;    ///< in that grid
+    Eigen::Index mirror = 0;  ///< the node's mirror image; itself in the midsagittal plane
     double mirror_sign = 1.0;
     double sd = 1.0;
     int axis = 0;
@@ -51,7 +54,7 @@ class WarpBasis {
   void add_affine(const WarpBasisOptions& options);
   void add_layer(const Eigen::AlignedBox3d& box, const BumpLayer& layer, double asymmetric_share);
 
-  std::vector<SpaceWarp::Bump> bumps_;  ///< without displacement
+  std::vector<BumpGrid> bumps_;  ///< without displacement
   std::vector<Mode> modes_;
 };
 

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "core/random.h"
-#include "reconstruction/phantom/skin_thickness.h"
-#include "reconstruction/volume/mesh_topology.h"
+#include "reconstruction/mesh/mesh_topology.h"
+#include "reconstruction/phantom/thickness_table.h"
 
 namespace skullstation {
 namespace {
@@ -87,9 +87,9 @@ TEST(SkinLandmarks, AreNamedOnceOnTheSkinAndSymmetric) {
   EXPECT_EQ(names.size(), skin_landmarks().size());
 }
 
-TEST(SkinLandmarks, LieAsDeepAsTheMeansOfTheTissueDepthTable) {
+TEST(SkinLandmarks, LieAsDeepAsTheMeansOfTheTissueThicknessTable) {
   const std::vector<Landmark> skull = canonical_landmarks();
-  for (const TissueDepth& depth : tissue_depths()) {
+  for (const TissueThickness& depth : thickness_table()) {
     const std::string bone(depth.bone);
     const std::string side = depth.bilateral ? " left" : "";
     const double thickness =

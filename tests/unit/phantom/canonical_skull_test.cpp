@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/random.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/phantom/isosurface.h"
-#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 namespace {

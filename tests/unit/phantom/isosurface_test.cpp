@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/random.h"
-#include "reconstruction/volume/mesh_topology.h"
+#include "reconstruction/mesh/mesh_topology.h"
 
 namespace skullstation {
 namespace {

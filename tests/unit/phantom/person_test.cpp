@@ -8,9 +8,11 @@
 #include <filesystem>
 
 #include "core/file.h"
+#include "reconstruction/mesh/mesh_topology.h"
+#include "reconstruction/phantom/person_ct.h"
 #include "reconstruction/phantom/person_files.h"
+#include "reconstruction/phantom/specimen.h"
 #include "reconstruction/phantom/thickness_table.h"
-#include "reconstruction/volume/mesh_topology.h"
 
 namespace skullstation {
 namespace {
@@ -73,6 +75,43 @@ TEST(Person, HasTheDrawnMeasuresAndThicknesses) {
   EXPECT_EQ(person.skin.triangles, maker().make(average_person(Sex::male), 2).skin.triangles);
 }
 
+TEST(Person, HasTheSkinOutsideTheBone) {
+  for (const std::uint64_t seed : {21, 22, 23}) {
+    const Person person = maker().make(draw_person(seed), 2);
+    EXPECT_GE(person.face.least_thickness_mm, 1.5) << seed;
+    EXPECT_GT(person.face.least_determinant, 0.15) << seed;
+    for (const double thickness_mm : skull_to_skin_mm(person, 2)) ASSERT_GT(thickness_mm, 1.2);
+  }
+}
+
+TEST(Person, OfThinTissueIsNotThinnerThanItsFloor) {
+  PersonParameters thin = average_person(Sex::male);
+  for (ThicknessPair& pair : thin.thickness_mm) pair = {0.3 * pair.left_mm, 0.3 * pair.right_mm};
+  const Person person = maker().make(thin, 2);
+  EXPECT_GE(person.face.least_thickness_mm, 1.5);
+}
+
+TEST(Person, OpensTheMouthWithTheMandible) {
+  PersonParameters parameters = average_person(Sex::male);
+  const Person closed = maker().make(parameters, 2);
+  parameters.mandible_opening_deg = 5.0;
+  const Person open = maker().make(parameters, 2);
+  const auto moved_mm = [&](const char* bone, const char* skin) {
+    const auto at = [](const std::vector<Landmark>& landmarks, const char* name) {
+      return landmarks[landmark_index(landmarks, name)].position_mm;
+    };
+    return std::pair{(at(open.bone.landmarks, bone) - at(closed.bone.landmarks, bone)).norm(),
+                     (at(open.face.landmarks, skin) - at(closed.face.landmarks, skin)).norm()};
+  };
+  const auto [chin_mm, chin_skin_mm] = moved_mm("gnathion", "gnathion skin");
+  EXPECT_GT(chin_mm, 6.0);
+  EXPECT_NEAR(chin_skin_mm, chin_mm, 1.5);
+  const auto [brow_mm, brow_skin_mm] = moved_mm("glabella", "glabella skin");
+  EXPECT_LT(brow_mm, 1e-9);
+  EXPECT_LT(brow_skin_mm, 0.5);
+  EXPECT_GE(open.face.least_thickness_mm, 1.5);
+}
+
 TEST(Person, LiesInItsOwnFrankfurtPlane) {
   const Person person = maker().make(draw_person(11), 2);
   const auto at = [&](const char* name) {
@@ -89,6 +128,49 @@ TEST(Person, IsTheSameForAnyNumberOfThreads) {
   const Person two = maker().make(draw_person(12), 2);
   EXPECT_EQ(one.skull.vertices, two.skull.vertices);
   EXPECT_EQ(one.skin.vertices, two.skin.vertices);
+}
+
+TEST(Specimen, LacksWhatTheDamageTakes) {
+  const Person person = maker().make(average_person(Sex::male), 2);
+  const TriangleMesh whole = specimen(person, {}, 1);
+  EXPECT_EQ(whole.triangles, person.skull.triangles);
+  ASSERT_EQ(whole.colors.rows(), whole.vertices.rows());
+  EXPECT_GT(whole.colors.col(0).maxCoeff(), whole.colors.col(0).minCoeff());
+  SpecimenDamage damage;
+  ASSERT_TRUE(add_damage(damage, "missing-mandible").has_value());
+  EXPECT_EQ(specimen(person, damage, 1).vertices.rows(), person.cranium_vertices);
+  damage = {};
+  ASSERT_TRUE(add_damage(damage, "missing-calvaria").has_value());
+  EXPECT_LT(specimen(person, damage, 1).vertices.col(2).maxCoeff(),
+            whole.vertices.col(2).maxCoeff() - 30.0);
+  damage = {};
+  ASSERT_TRUE(add_damage(damage, "hole").has_value());
+  const Eigen::Index lost = whole.vertices.rows() - specimen(person, damage, 1).vertices.rows();
+  EXPECT_GT(lost, 20);
+  EXPECT_LT(lost, whole.vertices.rows() / 20);
+  EXPECT_EQ(add_damage(damage, "no-brain").error().kind, ErrorKind::usage);
+}
+
+TEST(PersonCt, FlawsAreKnownByTheirWords) {
+  const Person person = maker().make(average_person(Sex::male), 2);
+  PhantomCtOptions options;
+  for (const char* word :
+       {"cropped-calvaria", "cropped-nose", "head-rest", "table", "metal", "padding"}) {
+    EXPECT_TRUE(add_flaw(options, person, word).has_value()) << word;
+  }
+  EXPECT_EQ(options.metal_mm.size(), 2U);
+  EXPECT_TRUE(options.validate().has_value());
+  EXPECT_EQ(add_flaw(options, person, "ghost").error().kind, ErrorKind::usage);
+}
+
+TEST(PersonCt, CarriesThePersonBackToTheCanonicalHead) {
+  const Person person = maker().make(draw_person(14), 2);
+  const PhantomBody body = body_of(person);
+  for (const Eigen::Vector3d& place : {Eigen::Vector3d(30, -80, -10), Eigen::Vector3d(0, 20, 60)}) {
+    const Eigen::Vector3d patient =
+        person.bone.person_from_canonical(person.face.face_from_canonical(place));
+    EXPECT_LT((body.canonical_from_patient(patient) - place).norm(), 0.5);
+  }
 }
 
 TEST(PersonFiles, MakeASubjectFolder) {

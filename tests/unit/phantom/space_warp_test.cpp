@@ -13,12 +13,22 @@ namespace {
 
 using Eigen::Vector3d;
 
+BumpGrid single_bump(const Vector3d& center, double width_mm, const Vector3d& displacement) {
+  BumpGrid grid;
+  grid.origin_mm = center;
+  grid.width_mm = width_mm;
+  grid.size = {1, 1, 1};
+  grid.displacement_mm = displacement;
+  return grid;
+}
+
 SpaceWarp some_warp() {
   SpaceWarp warp;
   warp.stretch(0, 0) = 0.05;
   warp.stretch(1, 2) = -0.03;
   warp.shift_mm = {1.0, -2.0, 3.0};
-  warp.bumps = {{{10, 20, 30}, 25.0, {4, -3, 2}}, {{-40, -60, 0}, 18.0, {-2, 3, 1}}};
+  warp.bumps = {single_bump({10, 20, 30}, 25.0, {4, -3, 2}),
+                single_bump({-40, -60, 0}, 18.0, {-2, 3, 1})};
   warp.motion.translation = {5, 0, -1};
   warp.motion.rotation = Eigen::AngleAxisd(0.2, Vector3d::UnitX());
   return warp;
@@ -51,7 +61,7 @@ TEST(SpaceWarp, SourceIsTheInverse) {
 
 TEST(SpaceWarp, AFoldHasANegativeDeterminant) {
   SpaceWarp warp;
-  warp.bumps = {{{0, 0, 0}, 10.0, {-30, 0, 0}}};
+  warp.bumps = {single_bump({0, 0, 0}, 10.0, {-30, 0, 0})};
   const Eigen::AlignedBox3d box(Vector3d::Constant(-30.0), Vector3d::Constant(30.0));
   EXPECT_LT(least_determinant(warp, box, 5.0, 2), 0.0);
   EXPECT_GT(least_determinant(some_warp(), box, 5.0, 1), 0.5);
