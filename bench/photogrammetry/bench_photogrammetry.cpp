@@ -7,19 +7,19 @@
 #include <time.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "bench/photogrammetry/bench_scene.h"
+#include "bench/photogrammetry/bench_views.h"
 #include "bench/photogrammetry/surface_measures.h"
-#include "core/parallel.h"
 #include "core/session/image_file.h"
-#include "core/session/session.h"
+#include "reconstruction/io/glb.h"
 #include "reconstruction/io/ply.h"
 #include "reconstruction/photogrammetry/reconstruct_surface.h"
 
@@ -30,10 +30,17 @@ struct Options {
   BenchScene scene;
   std::string cache;
   std::string folder;
-  std::string out;
+  std::filesystem::path out;
   ReconstructionQuality quality = ReconstructionQuality::standard;
   int threads = 0;
+  bool physics = false;
 };
+
+double processor_s() {
+  timespec used{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+}
 
 /// Prints what passed since the last stage: the processor's time counts on a busy machine.
 class Stopwatch {
@@ -53,11 +60,6 @@ class Stopwatch {
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
     return std::chrono::duration<double>(now).count();
   }
-  static double processor_s() {
-    timespec used{};
-    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
-    return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
-  }
   static void print(std::string_view stage, double wall, double processor) {
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
@@ -68,36 +70,6 @@ class Stopwatch {
   double wall_ = wall_s(), processor_ = processor_s();
   double total_wall_ = 0.0, total_processor_ = 0.0;
 };
-
-Result<StereoView> load_view(const Session& session, const SessionView& view,
-                             const std::filesystem::path& folder) {
-  const auto photograph = read_image(folder / view.image);
-  if (!photograph) return forward(photograph);
-  const auto mask = read_image(folder / view.mask.value_or(""));
-  if (!mask) return forward(mask);
-  for (const SessionCamera& camera : session.cameras) {
-    if (camera.id != view.camera || !camera.params || !view.camera_from_table) continue;
-    const Lens lens = Lens::from_params(camera.width, camera.height, camera.model, *camera.params);
-    return make_stereo_view(view.image, *photograph, *mask, lens, *view.camera_from_table,
-                            view.pass);
-  }
-  return fail(ErrorKind::bad_input, view.image, "has no intrinsics or no pose");
-}
-
-Result<std::vector<StereoView>> load_views(const std::filesystem::path& folder, int threads) {
-  const auto session = read_session(folder);
-  if (!session) return forward(session);
-  const auto count = static_cast<int>(session->views.size());
-  std::vector<std::optional<Result<StereoView>>> loaded(count);
-  parallel_for(count, threads,
-               [&](int i) { loaded[i] = load_view(*session, session->views[i], folder); });
-  std::vector<StereoView> views;
-  for (auto& view : loaded) {
-    if (!*view) return forward(*view);
-    views.push_back(**std::move(view));
-  }
-  return views;
-}
 
 void print_accuracy(const SurfaceMeasures& m, double wall_s) {
   constexpr const char* row = "{:<34} {:>7} {:>6} {:>6} {:>6} {:>7} {:>7} {:>7}\n";
@@ -115,20 +87,73 @@ void print_accuracy(const SurfaceMeasures& m, double wall_s) {
   fmt::print(row, "semi-global matching, TSDF", "236", "1.09", "0.47", "3.2", "33", "68", "88");
   fmt::print("surface {:.0f} cm2; truth seen by 3 or more views {:.0f} cm2\n", m.area_cm2,
              m.seen_cm2);
+  fmt::print("of it, by the slant of the third best view:");
+  for (const SlantMeasures& slant : m.by_slant) {
+    fmt::print("  to {:.0f} deg {:.0f} cm2, {:.1f} % < 0.5 mm", slant.most_slant_deg,
+               slant.seen_cm2, slant.within_half_mm_percent);
+  }
+  fmt::print("\n");
+}
+
+Result<std::filesystem::path> scene_of(const Options& options) {
+  if (!options.folder.empty()) return std::filesystem::path(options.folder);
+  return cached_scene(options.scene, options.cache, options.threads);
+}
+
+/// How the error depends on views, noise and resolution: one scene's photographs, fewer and fewer,
+/// noisier and noisier, smaller and smaller.
+Result<void> print_physics(const Options& options) {
+  const auto folder = scene_of(options);
+  if (!folder) return forward(folder);
+  const auto truth = read_ply(*folder / "truth.ply");
+  if (!truth) return forward(truth);
+  fmt::print("{:>6} {:>6} {:>9} {:>6} | {:>6} {:>6} {:>6} {:>9} {:>8}\n", "views", "noise",
+             "pixel mm", "CPU s", "mean", "median", "P95", "< 1 mm %", "seen cm2");
+  const BenchViewOptions variants[] = {{},
+                                       {.every = 2},
+                                       {.every = 4},
+                                       {.every = 6},
+                                       {.every = 2, .noise_sd = 2.0},
+                                       {.every = 2, .noise_sd = 4.0},
+                                       {.every = 2, .noise_sd = 8.0},
+                                       {.every = 2, .halvings = 1}};
+  for (BenchViewOptions variant : variants) {
+    variant.threads = options.threads;
+    const auto views = load_bench_views(*folder, variant);
+    if (!views) return forward(views);
+    SurfaceOptions how = SurfaceOptions::of(options.quality, *views);
+    how.threads = options.threads;
+    how.texture.reset();
+    const double begin_s = processor_s();
+    const auto surface = reconstruct_surface(*views, how);
+    const double passed_s = processor_s() - begin_s;
+    if (!surface) {
+      fmt::print("{:>6} {:>6} {}\n", views->size(), variant.noise_sd, surface.error().message());
+      continue;
+    }
+    std::vector<float> pixels_mm = surface->coverage.ground_sample_mm;
+    const auto middle = pixels_mm.begin() + static_cast<std::ptrdiff_t>(pixels_mm.size() / 2);
+    std::nth_element(pixels_mm.begin(), middle, pixels_mm.end());
+    const double pixel_mm = *middle;
+    const auto m = measure_surface(surface->mesh, *truth, *views, options.threads);
+    if (!m) return forward(m);
+    fmt::print("{:>6} {:>6} {:>9.2f} {:>6.0f} | {:>6.2f} {:>6.2f} {:>6.2f} {:>9.1f} {:>8.0f}\n",
+               views->size(), variant.noise_sd, pixel_mm, passed_s, m->mean_mm, m->median_mm,
+               m->p95_mm, m->within_1mm_percent, m->seen_cm2);
+    std::fflush(stdout);
+  }
+  return {};
 }
 
 Result<void> run(const Options& options) {
-  std::filesystem::path folder = options.folder;
-  if (folder.empty()) {
-    const auto made = cached_scene(options.scene, options.cache, options.threads);
-    if (!made) return forward(made);
-    folder = *made;
-  }
+  const auto made = scene_of(options);
+  if (!made) return forward(made);
+  const std::filesystem::path& folder = *made;
   fmt::print("scene {}\n{:<20} {:>9} {:>9} {:>9}\n", folder.string(), "", "wall s", "CPU s",
              "peak MB");
   const auto start = std::chrono::steady_clock::now();
   Stopwatch watch;
-  const auto views = load_views(folder, options.threads);
+  const auto views = load_bench_views(folder, {.threads = options.threads});
   if (!views) return forward(views);
   watch.lap("load and undistort");
   SurfaceOptions how = SurfaceOptions::of(options.quality, *views);
@@ -149,6 +174,16 @@ Result<void> run(const Options& options) {
              surface->mesh.vertices.rows(), surface->mesh.triangles.rows(),
              surface->coverage.open_edge_mm);
   if (options.out.empty()) return {};
+  if (surface->textured) {
+    const TexturedSurface& textured = *surface->textured;
+    fmt::print("textured: {} triangles, atlas {} px\n", textured.mesh.triangles.rows(),
+               textured.atlas.width);
+    auto glb = options.out;
+    const auto written =
+        write_glb(textured.mesh, {textured.coordinates, encode_jpeg(textured.atlas, 92)},
+                  glb.replace_extension(".glb"));
+    if (!written) return written;
+  }
   return write_ply(surface->mesh, options.out);
 }
 
@@ -166,6 +201,8 @@ int main(int argc, char** argv) {
   app.add_option("--width", options.scene.width, "of the photographs [px]");
   app.add_option("--height", options.scene.height, "of the photographs [px]");
   app.add_option("--out", options.out, "write the surface to this PLY file");
+  app.add_flag("--physics", options.physics,
+               "a table of error against views, noise and resolution, from one scene");
   app.add_option("--threads", options.threads, "0: all");
   app.add_option("--quality", options.quality, "draft, standard or fine")
       ->transform(CLI::CheckedTransformer(std::map<std::string, ReconstructionQuality>{
@@ -177,7 +214,9 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "give --cache or --scene\n");
     return 2;
   }
-  if (const auto done = skullstation::run(options); !done) {
+  const auto done =
+      options.physics ? skullstation::print_physics(options) : skullstation::run(options);
+  if (!done) {
     fmt::print(stderr, "{}\n", done.error().message());
     return skullstation::exit_code(done.error().kind);
   }

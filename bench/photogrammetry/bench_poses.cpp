@@ -186,7 +186,7 @@ int run_session(const fs::path& folder, const fs::path& masks_folder) {
   for (SessionView& view : session->views) view.camera_from_table.reset();
   const auto observations = pose_observations(*session, *photographs, 0);
   fmt::print("  board corners: {}\n", watch.look());
-  const auto found = find_poses(*session, observations, {});
+  const auto found = find_poses(*session, *photographs, observations, {});
   if (!found) {
     fmt::print("  poses: {}\n", found.error().message());
     return 1;

@@ -2,10 +2,14 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/units.h"
 #include "reconstruction/distance/surface_samples.h"
 #include "reconstruction/distance/triangle_bvh.h"
 #include "reconstruction/rendering/ray_scene.h"
@@ -24,20 +28,54 @@ void for_each_sample(const std::vector<SurfaceSample>& samples, int threads, con
   });
 }
 
-int views_that_see(const SurfaceSample& sample, const TriangleMesh& truth, const RayScene& scene,
-                   std::span<const StereoView> views) {
+/// Angle between the normal and the third best of the views that see the point [deg]; nothing if
+/// fewer than three do.
+std::optional<double> third_best_slant_deg(const SurfaceSample& sample, const TriangleMesh& truth,
+                                           const RayScene& scene,
+                                           std::span<const StereoView> views) {
   const Eigen::Vector3d a = truth.vertices.row(truth.triangles(sample.triangle, 0));
   const Eigen::Vector3d b = truth.vertices.row(truth.triangles(sample.triangle, 1));
   const Eigen::Vector3d c = truth.vertices.row(truth.triangles(sample.triangle, 2));
   const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
-  int seen = 0;
+  std::vector<double> cosines;
   for (const StereoView& view : views) {
     const Eigen::Vector3d way = view.centre_mm() - sample.point;
     const double distance = way.norm();
-    if (way.dot(normal) <= 0.1 * distance) continue;
-    seen += scene.blocked(sample.point + 0.02 * normal, way / distance, distance) ? 0 : 1;
+    const double cosine = way.dot(normal) / distance;
+    if (cosine <= 0.1) continue;
+    if (scene.blocked(sample.point + 0.02 * normal, way / distance, distance)) continue;
+    cosines.push_back(cosine);
   }
-  return seen;
+  if (cosines.size() < 3) return std::nullopt;
+  std::sort(cosines.begin(), cosines.end(), std::greater<>());
+  return degrees(std::acos(std::min(cosines[2], 1.0)));
+}
+
+/// By area: what of the truth is seen and what the surface comes near to.
+void measure_completeness(const std::vector<SurfaceSample>& samples,
+                          const std::vector<std::optional<double>>& slant_deg,
+                          const std::vector<double>& gap_mm, SurfaceMeasures& measures) {
+  constexpr std::array<double, 5> limits_deg = {45.0, 60.0, 70.0, 78.0, 90.0};
+  std::array<double, 5> seen{}, near{};
+  double one = 0.0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!slant_deg[i]) continue;
+    const auto limit = std::lower_bound(limits_deg.begin(), limits_deg.end(), *slant_deg[i]);
+    const auto bin = static_cast<std::size_t>(limit - limits_deg.begin());
+    seen[bin] += samples[i].area_mm2;
+    if (gap_mm[i] < 0.5) near[bin] += samples[i].area_mm2;
+    if (gap_mm[i] < 1.0) one += samples[i].area_mm2;
+  }
+  double all_seen = 0.0, all_near = 0.0;
+  for (std::size_t bin = 0; bin < limits_deg.size(); ++bin) {
+    all_seen += seen[bin];
+    all_near += near[bin];
+    measures.by_slant[bin] = {std::min(limits_deg[bin], 84.0), seen[bin] / 100.0,
+                              seen[bin] > 0.0 ? 100.0 * near[bin] / seen[bin] : 0.0};
+  }
+  measures.seen_cm2 = all_seen / 100.0;
+  measures.within_half_mm_percent = 100.0 * all_near / all_seen;
+  measures.within_1mm_percent = 100.0 * one / all_seen;
 }
 
 }  // namespace
@@ -76,23 +114,14 @@ Result<SurfaceMeasures> measure_surface(const TriangleMesh& surface, const Trian
   const TriangleBvh surface_tree(surface);
   const TriangleMesh* const meshes[] = {&truth};
   const RayScene scene(meshes);
-  std::vector<double> gap(true_samples->size(), -1.0);
+  std::vector<std::optional<double>> slant_deg(true_samples->size());
+  std::vector<double> gap_mm(true_samples->size());
   for_each_sample(*true_samples, threads, [&](int i) {
     const SurfaceSample& sample = (*true_samples)[i];
-    if (views_that_see(sample, truth, scene, views) < 3) return;
-    gap[i] = surface_tree.closest(sample.point, 2.0).distance_mm;
+    slant_deg[i] = third_best_slant_deg(sample, truth, scene, views);
+    if (slant_deg[i]) gap_mm[i] = surface_tree.closest(sample.point, 2.0).distance_mm;
   });
-  double seen = 0.0, half = 0.0, one = 0.0;
-  for (std::size_t i = 0; i < gap.size(); ++i) {
-    if (gap[i] < 0.0) continue;
-    const double area = (*true_samples)[i].area_mm2;
-    seen += area;
-    if (gap[i] < 0.5) half += area;
-    if (gap[i] < 1.0) one += area;
-  }
-  measures.seen_cm2 = seen / 100.0;
-  measures.within_half_mm_percent = 100.0 * half / seen;
-  measures.within_1mm_percent = 100.0 * one / seen;
+  measure_completeness(*true_samples, slant_deg, gap_mm, measures);
   return measures;
 }
 

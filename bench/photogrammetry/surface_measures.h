@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "core/result.h"
@@ -7,6 +8,13 @@
 #include "reconstruction/photogrammetry/stereo_view.h"
 
 namespace skullstation {
+
+/// How much of the truth the surface comes near to.
+struct SlantMeasures {
+  double most_slant_deg = 0.0;
+  double seen_cm2 = 0.0;
+  double within_half_mm_percent = 0.0;
+};
 
 /// A reconstructed surface against the true one, as in the table of PHOTOGRAMMETRY's peers.
 struct SurfaceMeasures {
@@ -18,6 +26,8 @@ struct SurfaceMeasures {
   double seen_cm2 = 0.0;                ///< of the truth: seen by 3 or more views
   double within_half_mm_percent = 0.0;  ///< of that
   double within_1mm_percent = 0.0;
+  /// The same by how aslant the third best of the views sees it: below 45, 60, 70, 78, 84 deg.
+  std::array<SlantMeasures, 5> by_slant{};
 };
 
 /// Seen: less than 84 deg off the normal and nothing of the specimen before it.

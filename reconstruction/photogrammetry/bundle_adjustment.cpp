@@ -2,12 +2,13 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "core/adjustment/bundle_solver.h"
+#include "core/adjustment/reprojection.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -16,47 +17,6 @@ namespace {
 
 template <class T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
-
-/// Lens::project() for any scalar.
-template <class T>
-Eigen::Matrix<T, 2, 1> project_opencv(const T* intrinsics, const Vector3<T>& x_camera) {
-  const T x = x_camera.x() / x_camera.z();
-  const T y = x_camera.y() / x_camera.z();
-  const T r2 = x * x + y * y;
-  const T radial = T(1.0) + r2 * (intrinsics[4] + r2 * intrinsics[5]);
-  const T& p1 = intrinsics[6];
-  const T& p2 = intrinsics[7];
-  const T xd = x * radial + T(2.0) * p1 * x * y + p2 * (r2 + T(2.0) * x * x);
-  const T yd = y * radial + p1 * (r2 + T(2.0) * y * y) + T(2.0) * p2 * x * y;
-  return {intrinsics[0] * xd + intrinsics[2], intrinsics[1] * yd + intrinsics[3]};
-}
-
-template <class T>
-Vector3<T> transformed(const T* rotation, const T* translation, const Vector3<T>& x) {
-  const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
-  const Eigen::Map<const Vector3<T>> t(translation);
-  return q * x + t;
-}
-
-/// x_table of a point in the board frame; the unknowns as in BundleAxis.
-template <class T>
-Vector3<T> on_table(const T* axis, const Vector3<T>& x_board) {
-  const Vector3<T> z = Vector3<T>(axis[2], axis[3], T(1.0)).normalized();
-  const Vector3<T> board_x(T(1.0), T(0.0), T(0.0));
-  const Vector3<T> x = (board_x - z * z.x()).normalized();
-  const Vector3<T> y = z.cross(x);
-  const Vector3<T> from_origin = x_board - Vector3<T>(axis[0], axis[1], T(0.0));
-  return {x.dot(from_origin), y.dot(from_origin), z.dot(from_origin)};
-}
-
-template <class T>
-Vector3<T> turned(const T& angle_rad, const Vector3<T>& x) {
-  using std::cos;
-  using std::sin;
-  const T c = cos(angle_rad);
-  const T s = sin(angle_rad);
-  return {c * x.x() - s * x.y(), s * x.x() + c * x.y(), x.z()};
-}
 
 struct CornerResidual {
   Eigen::Vector3d x_board;
@@ -99,8 +59,8 @@ struct RingResidual {
                   T* residual) const {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Vector3<T> x = points[i].cast<T>();
-      const Vector3<T> by_ring = transformed<T>(ring_rotation, ring_translation,
-                                                turned<T>(*angle_rad, on_table<T>(axis, x)));
+      const Vector3<T> by_ring = transformed<T>(
+          ring_rotation, ring_translation, turned<T>(*angle_rad, board_point_on_table<T>(axis, x)));
       Eigen::Map<Vector3<T>>(residual + 3 * i) =
           (transformed<T>(rotation, translation, x) - by_ring) / T(sd_mm);
     }
@@ -155,7 +115,7 @@ class CeresBundle {
     for (BundleView& view : problem_.views) {
       if (view.ring < 0) continue;
       BundleRing& ring = problem_.rings[static_cast<std::size_t>(view.ring)];
-      BundleAxis& axis = problem_.axes[static_cast<std::size_t>(ring.axis)];
+      TableAxis& axis = problem_.axes[static_cast<std::size_t>(ring.axis)];
       ceres_.AddResidualBlock(
           new ceres::AutoDiffCostFunction<RingResidual, 12, 4, 1, 4, 3, 4, 3>(
               new RingResidual{reach_points(trust.reach_mm), trust.departure_mm / ring_weight}),
@@ -182,18 +142,7 @@ class CeresBundle {
     }
   }
 
-  bool solve() {
-    ceres::Solver::Options options;
-    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-    options.max_num_iterations = 100;
-    options.function_tolerance = 1e-10;
-    options.parameter_tolerance = 1e-10;
-    options.num_threads = 1;
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &ceres_, &summary);
-    return summary.IsSolutionUsable();
-  }
+  bool solve() { return solve_bundle(ceres_, BundleShape::many_views); }
 
   void finish() {
     for (std::size_t i = 0; i < intrinsics_.size(); ++i) {
@@ -236,35 +185,6 @@ class CeresBundle {
   ceres::Problem ceres_;
 };
 
-/// The normal equations' inverse; empty if they are singular.
-Eigen::MatrixXd inverse_normal(ceres::Problem& problem, const std::vector<double*>& blocks) {
-  ceres::Problem::EvaluateOptions options;
-  options.parameter_blocks = blocks;
-  options.apply_loss_function = true;
-  ceres::CRSMatrix jacobian;
-  if (!problem.Evaluate(options, nullptr, nullptr, nullptr, &jacobian)) return {};
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(jacobian.num_cols, jacobian.num_cols);
-  for (int row = 0; row < jacobian.num_rows; ++row) {
-    const auto begin = static_cast<std::size_t>(jacobian.rows[static_cast<std::size_t>(row)]);
-    const auto end = static_cast<std::size_t>(jacobian.rows[static_cast<std::size_t>(row) + 1]);
-    for (std::size_t i = begin; i < end; ++i) {
-      for (std::size_t j = begin; j < end; ++j) {
-        normal(jacobian.cols[i], jacobian.cols[j]) += jacobian.values[i] * jacobian.values[j];
-      }
-    }
-  }
-  // The unknowns' units differ by orders of magnitude: a unit diagonal makes rank visible.
-  if (!(normal.diagonal().minCoeff() > 0.0)) return {};
-  const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * normal * scale.asDiagonal();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(scaled);
-  constexpr double rank_tolerance = 1e-13;
-  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > rank_tolerance)) return {};
-  const Eigen::MatrixXd inverse =
-      factor.solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
-  return scale.asDiagonal() * inverse * scale.asDiagonal();
-}
-
 std::optional<BundleCovariance> CeresBundle::covariance() {
   std::vector<double*> blocks;
   std::map<const double*, int> column;
@@ -288,8 +208,8 @@ std::optional<BundleCovariance> CeresBundle::covariance() {
     add(rotation(ring.camera_from_station));
     add(translation(ring.camera_from_station));
   }
-  for (BundleAxis& axis : problem_.axes) add(axis.unknowns.data());
-  const Eigen::MatrixXd inverse = inverse_normal(ceres_, blocks);
+  for (TableAxis& axis : problem_.axes) add(axis.unknowns.data());
+  const Eigen::MatrixXd inverse = bundle_covariance(ceres_, blocks, -1, true);
   if (inverse.size() == 0) return std::nullopt;
 
   BundleCovariance result;
@@ -328,15 +248,6 @@ std::optional<BundleCovariance> CeresBundle::covariance() {
 
 }  // namespace
 
-Rigid3 BundleAxis::table_from_board() const {
-  const Eigen::Vector3d origin = on_table<double>(unknowns.data(), {0.0, 0.0, 0.0});
-  Eigen::Matrix3d rotation;
-  for (int i = 0; i < 3; ++i) {
-    rotation.col(i) = on_table<double>(unknowns.data(), Eigen::Vector3d::Unit(i)) - origin;
-  }
-  return {Eigen::Quaterniond(rotation).normalized(), origin};
-}
-
 std::array<Eigen::Vector3d, 4> reach_points(double reach_mm) {
   // A tetrahedron about the middle of a specimen that stands on the board.
   const double a = reach_mm / std::sqrt(3.0);
@@ -347,7 +258,7 @@ std::array<Eigen::Vector3d, 4> reach_points(double reach_mm) {
 
 double ring_departure_mm(const BundleProblem& problem, const BundleView& view, double reach_mm) {
   const BundleRing& ring = problem.rings[static_cast<std::size_t>(view.ring)];
-  const BundleAxis& axis = problem.axes[static_cast<std::size_t>(ring.axis)];
+  const TableAxis& axis = problem.axes[static_cast<std::size_t>(ring.axis)];
   const Rigid3 by_ring = ring.camera_from_station * rotation_about_z(degrees(view.angle_rad)) *
                          axis.table_from_board();
   double sum = 0.0;

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/adjustment/table_axis.h"
 #include "core/session/charuco_board.h"
 #include "core/session/lens.h"
 #include "core/transform.h"
@@ -29,15 +30,6 @@ struct BundleView {
   Rigid3 camera_from_board;  ///< start value and result
 };
 
-/// Where the table's axis passes through the board of one pass: the point in the board's plane
-/// [mm] and the direction (x, y, 1), in the board frame.
-struct BundleAxis {
-  std::array<double, 4> unknowns{};  ///< point x, point y, direction x, direction y
-
-  /// x along the board's x, z along the axis, origin where it passes the board's plane.
-  Rigid3 table_from_board() const;
-};
-
 /// One camera in one pass: it stands still while the table turns.
 struct BundleRing {
   int axis = 0;
@@ -55,9 +47,9 @@ struct BundleProblem {
   std::vector<BundleLens> lenses;
   std::vector<BundleView> views;
   std::vector<BundleRing> rings;
-  std::vector<BundleAxis> axes;
-  double corner_sd_px = 0.1;  ///< of one coordinate
-  double huber_sds = 3.0;     ///< errors beyond so many standard deviations count linearly
+  std::vector<TableAxis> axes;  ///< one a pass
+  double corner_sd_px = 0.1;    ///< of one coordinate
+  double huber_sds = 3.0;       ///< errors beyond so many standard deviations count linearly
 };
 
 /// Covariance of all unknowns that are free, from the normal equations.

@@ -1,12 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/triangle_mesh.h"
-#include "reconstruction/photogrammetry/depth_maps.h"
-#include "reconstruction/photogrammetry/stereo_view.h"
+#include "reconstruction/photogrammetry/sights.h"
 
 namespace skullstation {
 
@@ -18,20 +16,11 @@ struct Coverage {
   double open_edge_mm = 0.0;            ///< length of the surface's border
 };
 
-/// Finds the views that see each vertex (their depth maps lie no more than `depth_gap_mm` before
-/// it) from less than 80 deg off its normal. The standard error takes each of n views' depths as
+/// Finds the views that see each vertex. The standard error takes each of n views' depths as
 /// matched to `match_sd_px` and the angle between the lines of sight that lie farthest apart:
 /// sd = gsd match_sd_px / (2 tan(angle / 2) sqrt(n)) (Kraus 2007, normal case).
 /// \pre the mesh has normals
-Coverage measure_coverage(const TriangleMesh& mesh, std::span<const DepthMap> maps,
-                          std::span<const StereoView> views, double depth_gap_mm,
-                          double match_sd_px, int threads);
-
-/// Vertex colours (sRGB) blended from the views that see each vertex, the frontal and close ones
-/// most, after the views' exposures are made equal: each view's gain in linear light is the median
-/// ratio between what its neighbours see and what it sees.
-/// \pre the mesh has normals
-Colors blend_vertex_colors(const TriangleMesh& mesh, std::span<const DepthMap> maps,
-                           std::span<const StereoView> views, double depth_gap_mm, int threads);
+Coverage measure_coverage(const TriangleMesh& mesh, const Sights& sights, double match_sd_px,
+                          int threads);
 
 }  // namespace skullstation

@@ -1,6 +1,9 @@
 #include "reconstruction/photogrammetry/depth_agreement.h"
 
 #include <cmath>
+#include <utility>
+
+#include "core/parallel.h"
 
 namespace skullstation {
 
@@ -69,6 +72,22 @@ std::vector<std::uint8_t> count_agreement(std::span<const DepthMap> maps, int re
     }
   }
   return count;
+}
+
+void keep_confirmed(std::vector<DepthMap>& maps, const DepthMapOptions& options) {
+  const auto count = static_cast<int>(maps.size());
+  std::vector<std::vector<std::uint8_t>> agreement(count);
+  parallel_for(count, options.threads,
+               [&](int v) { agreement[v] = count_agreement(maps, v, options); });
+  parallel_for(count, options.threads, [&](int v) {
+    DepthMap& map = maps[v];
+    map.agreement = std::move(agreement[v]);
+    for (std::size_t i = 0; i < map.planes.size(); ++i) {
+      if (map.agreement[i] < options.least_agreement || map.cost[i] > options.worst_cost) {
+        map.planes[i] = {};
+      }
+    }
+  });
 }
 
 }  // namespace skullstation

@@ -13,4 +13,8 @@ namespace skullstation {
 std::vector<std::uint8_t> count_agreement(std::span<const DepthMap> maps, int reference,
                                           const DepthMapOptions& options);
 
+/// Counts the agreement of all maps and takes out the depths that too few views confirm or that
+/// match too badly.
+void keep_confirmed(std::vector<DepthMap>& maps, const DepthMapOptions& options);
+
 }  // namespace skullstation

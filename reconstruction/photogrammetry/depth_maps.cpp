@@ -101,10 +101,10 @@ Result<void> DepthMapOptions::validate() const {
   return {};
 }
 
-Result<std::vector<DepthMap>> compute_depth_maps(std::span<const StereoView> views,
-                                                 const VisualHull& hull,
-                                                 const DepthMapOptions& options,
-                                                 const Progress& progress) {
+Result<std::vector<DepthMap>> match_depth_maps(std::span<const StereoView> views,
+                                               const VisualHull& hull,
+                                               const DepthMapOptions& options,
+                                               const Progress& progress) {
   if (const auto valid = options.validate(); !valid) return forward(valid);
   const auto count = static_cast<int>(views.size());
   const std::vector<std::vector<int>> sources =
@@ -190,20 +190,17 @@ Result<std::vector<DepthMap>> compute_depth_maps(std::span<const StereoView> vie
                 sources[v]};
     maps[v] = {};
   }
-  std::vector<std::vector<std::uint8_t>> agreement(count);
-  parallel_for(count, options.threads,
-               [&](int v) { agreement[v] = count_agreement(depth, v, options); });
-  parallel_for(count, options.threads, [&](int v) {
-    DepthMap& map = depth[v];
-    map.agreement = std::move(agreement[v]);
-    for (std::size_t i = 0; i < map.planes.size(); ++i) {
-      if (map.agreement[i] < options.least_agreement || map.cost[i] > options.worst_cost) {
-        map.planes[i] = {};
-      }
-    }
-  });
   progress.report(1.0, "depth maps");
   return depth;
+}
+
+Result<std::vector<DepthMap>> compute_depth_maps(std::span<const StereoView> views,
+                                                 const VisualHull& hull,
+                                                 const DepthMapOptions& options,
+                                                 const Progress& progress) {
+  auto maps = match_depth_maps(views, hull, options, progress);
+  if (maps) keep_confirmed(*maps, options);
+  return maps;
 }
 
 }  // namespace skullstation

@@ -45,9 +45,15 @@ struct DepthMapOptions {
 
 /// A depth map of every view, coarse to fine: photometric sweeps on the coarsest level, then
 /// rounds with geometric consistency on each (Xu & Tao 2019), each round after all views are done
-/// with the last. Depths that too few views confirm are taken out. `hull` bounds all depths.
-/// The same bytes for any number of threads. Fails with `bad_input` for fewer than 3 views or a
+/// with the last. `hull` bounds all depths. A depth for every pixel of the specimen, right or
+/// wrong, without agreement. The same bytes for any number of threads. Fails with `bad_input` for a
 /// view that has no other within a useful angle, `cancelled` on request.
+Result<std::vector<DepthMap>> match_depth_maps(std::span<const StereoView> views,
+                                               const VisualHull& hull,
+                                               const DepthMapOptions& options,
+                                               const Progress& progress);
+
+/// match_depth_maps() and then keep_confirmed().
 Result<std::vector<DepthMap>> compute_depth_maps(std::span<const StereoView> views,
                                                  const VisualHull& hull,
                                                  const DepthMapOptions& options,

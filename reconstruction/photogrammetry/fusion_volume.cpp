@@ -14,7 +14,7 @@ constexpr int kKeyOffset = 1 << (kKeyBits - 1);
 
 /// Sorts by z, then y, then x.
 std::uint64_t key_of(const Eigen::Vector3i& block) {
-  const auto part = [](int c) { return static_cast<std::uint64_t>(c + kKeyOffset); };
+  const auto part = [](int c) { return static_cast<std::uint64_t>(std::int64_t{c} + kKeyOffset); };
   return part(block.z()) << (2 * kKeyBits) | part(block.y()) << kKeyBits | part(block.x());
 }
 

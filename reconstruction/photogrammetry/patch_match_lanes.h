@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace skullstation {
@@ -62,7 +63,7 @@ template <class Gather>
   Float sum[kVectors];
   Float square[kVectors];
   Float product[kVectors];
-  for (int k = 0; k < kVectors; ++k) {
+  for (std::ptrdiff_t k = 0; k < kVectors; ++k) {
     Float offset_x, offset_y, weight, contrast;
     __builtin_memcpy(&offset_x, in.offset_x + k * W, sizeof offset_x);
     __builtin_memcpy(&offset_y, in.offset_y + k * W, sizeof offset_y);

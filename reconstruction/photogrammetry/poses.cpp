@@ -6,6 +6,7 @@ const char* to_string(ScaleSource source) {
   switch (source) {
     case ScaleSource::board: return "board";
     case ScaleSource::given_poses: return "given poses";
+    case ScaleSource::camera_radius: return "table angles and camera radius";
     case ScaleSource::unknown: break;
   }
   return "unknown";

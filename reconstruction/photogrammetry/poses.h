@@ -35,7 +35,8 @@ struct PoseObservation {
 struct ViewPose {
   std::string name;
   Rigid3 camera_from_table;
-  int corners = 0;      ///< of the board, that count
+  int corners = 0;  ///< of the board, that count
+  int points = 0;   ///< of the specimen, shared with other views; 0 without structure from motion
   double rms_px = 0.0;  ///< reprojection error
   /// Standard error of the camera's place and direction; 0 where it is not known.
   double position_error_mm = 0.0;
@@ -47,9 +48,9 @@ struct ViewPose {
 };
 
 /// What the unit of length rests on.
-enum class ScaleSource { board, given_poses, unknown };
+enum class ScaleSource { board, given_poses, camera_radius, unknown };
 
-/// "board", "given poses", "unknown".
+/// "board", "given poses", "table angles and camera radius", "unknown".
 const char* to_string(ScaleSource source);
 
 /// Lens after the adjustment with the standard error of its focal length (0: not adjusted).

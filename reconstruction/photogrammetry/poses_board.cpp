@@ -324,7 +324,7 @@ void report_table(const Work& work, const std::vector<PoseObservation>& views,
     TableMotion& motion = result.table.emplace_back();
     motion.pass = pass_of_axis[a];
     motion.departure_mm = trust.departure_mm;
-    const BundleAxis& axis = work.bundle.axes[a];
+    const TableAxis& axis = work.bundle.axes[a];
     motion.table_from_board = axis.table_from_board();
     motion.axis_offset_mm = std::hypot(axis.unknowns[0], axis.unknowns[1]);
     double squares = 0.0;

@@ -1,6 +1,5 @@
 #include "reconstruction/photogrammetry/poses_rings.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -14,44 +13,20 @@ namespace {
 
 using Members = std::vector<std::size_t>;  // indices of views
 
-/// The axis that all motions of the board, as its cameras saw them, turn about.
-std::optional<BundleAxis> common_axis(const BundleProblem& problem,
-                                      const std::vector<Members>& rings) {
+/// The axis that the board, as its cameras saw it, turns about.
+std::optional<TableAxis> common_axis(const BundleProblem& problem,
+                                     const std::vector<Members>& rings) {
   constexpr double least_turn_deg = 5.0;
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  bool turns = false;
+  std::vector<Rigid3> motions;
   for (const Members& ring : rings) {
     for (std::size_t i = 0; i < ring.size(); ++i) {
       // Each view against the one half a list away: large turns tell the axis best.
       const std::size_t j = (i + ring.size() / 2) % ring.size();
-      const Rigid3 motion = problem.views[ring[i]].camera_from_board.inverse() *
-                            problem.views[ring[j]].camera_from_board;
-      const Eigen::Vector3d half_sine = motion.rotation.w() < 0.0
-                                            ? Eigen::Vector3d(-motion.rotation.vec())
-                                            : motion.rotation.vec();
-      if (half_sine.norm() < std::sin(0.5 * radians(least_turn_deg))) continue;
-      turns = true;
-      // The board lies face up, so that its normal and the axis point to the same side.
-      direction += half_sine.z() < 0.0 ? Eigen::Vector3d(-half_sine) : half_sine;
-      // Points on the axis stay where they are: (I - R) p = t.
-      const Eigen::Matrix3d a = Eigen::Matrix3d::Identity() - motion.rotation.toRotationMatrix();
-      normal += a.transpose() * a;
-      right += a.transpose() * motion.translation;
+      motions.push_back(problem.views[ring[i]].camera_from_board.inverse() *
+                        problem.views[ring[j]].camera_from_board);
     }
   }
-  if (!turns || !(direction.z() > 0.5 * direction.norm())) return std::nullopt;
-  direction /= direction.z();
-  // Along the axis nothing is determined: the smallest solution, moved into the board's plane.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(normal);
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  for (int i = 1; i < 3; ++i) {
-    const Eigen::Vector3d v = solver.eigenvectors().col(i);
-    point += v * (v.dot(right) / solver.eigenvalues()[i]);
-  }
-  point -= direction * point.z();
-  return BundleAxis{{point.x(), point.y(), direction.x(), direction.y()}};
+  return axis_of_motions(motions, least_turn_deg);
 }
 
 /// Turn of the table from one view of a ring to another, as the board shows it.

@@ -134,7 +134,7 @@ std::vector<PoseObservation> pose_observations(const Session& session,
   return observations;
 }
 
-Result<PoseResult> find_poses(const Session& session,
+Result<PoseResult> find_poses(const Session& session, const std::vector<Image8>& photographs,
                               const std::vector<PoseObservation>& observations,
                               const PoseOptions& options, const Progress& progress) {
   PoseMethod method = options.method;
@@ -143,16 +143,17 @@ Result<PoseResult> find_poses(const Session& session,
   if (method == PoseMethod::automatic) {
     if (session.board) {
       method = PoseMethod::board;
-    } else if (given) {
-      method = PoseMethod::given;
     } else {
-      return fail(ErrorKind::bad_input, "session.json",
-                  "has neither a board nor poses, so that nothing tells where the cameras were",
-                  "describe the board that lies under the specimen, or give each view its "
-                  "camera_from_table");
+      method = given ? PoseMethod::given : PoseMethod::motion;
     }
   }
   if (method == PoseMethod::given) return given_poses(session, observations);
+  if (method == PoseMethod::motion) {
+    MotionPoseOptions motion = options.motion;
+    motion.threads = options.threads;
+    return poses_from_motion(observations, photographs, pose_cameras(session), session.board,
+                             motion, progress);
+  }
   if (!session.board) {
     return fail(ErrorKind::bad_input, "session.json", "describes no board to find poses from",
                 "add \"board\", or use the poses that are given");

@@ -8,19 +8,23 @@
 #include "core/result.h"
 #include "core/session/session.h"
 #include "reconstruction/photogrammetry/poses_board.h"
+#include "reconstruction/photogrammetry/poses_sfm.h"
 
 namespace skullstation {
 
 /// Where a session's poses come from.
 enum class PoseMethod {
-  automatic,  ///< the board where there is one, else the poses that came with the session
+  automatic,  ///< the board where there is one, else the poses that came with the session, else
+              ///< motion
   board,
-  given
+  given,
+  motion  ///< structure from motion over the specimen's own features
 };
 
 struct PoseOptions {
   PoseMethod method = PoseMethod::automatic;
   BoardPoseOptions board;
+  MotionPoseOptions motion;
   int threads = 0;
 };
 
@@ -39,8 +43,9 @@ std::vector<PoseObservation> pose_observations(const Session& session,
                                                const std::vector<Image8>& photographs, int threads);
 
 /// The poses by the method asked for. Views without one are dropped and named. Errors: `bad_input`
-/// where the session lacks what the method needs, else those of poses_from_board().
-Result<PoseResult> find_poses(const Session& session,
+/// where the session lacks what the method needs, else those of poses_from_board()
+/// and poses_from_motion().
+Result<PoseResult> find_poses(const Session& session, const std::vector<Image8>& photographs,
                               const std::vector<PoseObservation>& observations,
                               const PoseOptions& options, const Progress& progress = {});
 

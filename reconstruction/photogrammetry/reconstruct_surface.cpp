@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "reconstruction/mesh/decimation.h"
+#include "reconstruction/photogrammetry/surface_colors.h"
 #include "reconstruction/photogrammetry/surface_extraction.h"
 #include "reconstruction/photogrammetry/visual_hull.h"
 
@@ -42,6 +44,15 @@ double pixel_on_specimen_mm(std::span<const StereoView> views) {
   return *median;
 }
 
+/// The same mesh if no edge length is asked for.
+TriangleMesh thinned(TriangleMesh mesh, double edge_mm, double voxel_mm) {
+  if (edge_mm <= 0.0) return mesh;
+  // A fraction of a voxel, below what the depths are good for.
+  mesh = decimated(mesh, {.edge_mm = edge_mm, .max_error_mm = 0.1 * voxel_mm});
+  mesh.normals = vertex_normals(mesh);
+  return mesh;
+}
+
 }  // namespace
 
 SurfaceOptions SurfaceOptions::of(ReconstructionQuality quality,
@@ -57,18 +68,23 @@ SurfaceOptions SurfaceOptions::of(ReconstructionQuality quality,
 }
 
 Result<void> SurfaceOptions::validate() const {
-  if (const auto valid = depth.validate(); !valid) return valid;
-  if (const auto valid = fusion.validate(); !valid) return valid;
-  if (const auto valid = cleaning.validate(); !valid) return valid;
+  if (auto valid = depth.validate(); !valid) return valid;
+  if (auto valid = fusion.validate(); !valid) return valid;
+  if (auto valid = cleaning.validate(); !valid) return valid;
+  if (texture) {
+    if (auto valid = texture->validate(); !valid) return valid;
+  }
+  if (!(edge_mm >= 0.0 && edge_mm <= 50.0) || !(textured_edge_voxels >= 0.0)) {
+    return fail(ErrorKind::usage, "surface options", "edge_mm is 0 (as extracted) to 50");
+  }
   if (!(match_sd_px > 0.0)) {
     return fail(ErrorKind::usage, "surface options", "match_sd_px must be positive");
   }
   return {};
 }
 
-Result<ReconstructedSurface> reconstruct_surface(std::span<const StereoView> views,
-                                                 const SurfaceOptions& options,
-                                                 const Progress& progress) {
+Result<std::vector<DepthMap>> find_depths(std::span<const StereoView> views,
+                                          const SurfaceOptions& options, const Progress& progress) {
   if (const auto valid = options.validate(); !valid) return forward(valid);
   if (views.size() < 3) {
     return fail(ErrorKind::bad_input, "views",
@@ -80,41 +96,76 @@ Result<ReconstructedSurface> reconstruct_surface(std::span<const StereoView> vie
     return fail(ErrorKind::usage, view.name, "belongs to another pass than the first view",
                 "reconstruct each pass by itself, then join them");
   }
-  SurfaceOptions stages = options;
-  stages.depth.threads = stages.fusion.threads = options.threads;
-
-  const auto hull = carve_visual_hull(views, stages.depth.hull_resolution, options.threads);
+  DepthMapOptions depth = options.depth;
+  depth.threads = options.threads;
+  const auto hull = carve_visual_hull(views, depth.hull_resolution, options.threads);
   if (!hull) return forward(hull);
   options.after_stage("visual hull");
-  auto maps = compute_depth_maps(views, *hull, stages.depth, progress.part(0.02, 0.85));
-  if (!maps) return forward(maps);
-  options.after_stage("depth maps");
+  auto maps = compute_depth_maps(views, *hull, depth, progress);
+  if (maps) options.after_stage("depth maps");
+  return maps;
+}
+
+Result<ReconstructedSurface> surface_of_depths(std::vector<DepthMap> maps,
+                                               std::span<const StereoView> views,
+                                               const SurfaceOptions& options,
+                                               const Progress& progress) {
+  if (const auto valid = options.validate(); !valid) return forward(valid);
+  FusionOptions fusion = options.fusion;
+  fusion.threads = options.threads;
   FusedSurface surface;
   {
-    const auto volume = fuse_depth_maps(*maps, views, stages.fusion, progress.part(0.85, 0.93));
+    const auto volume = fuse_depth_maps(maps, views, fusion, progress.part(0.0, 0.6));
     if (!volume) return forward(volume);
     options.after_stage("fusion");
-    surface = extract_surface(*volume, stages.fusion.least_weight, options.threads);
+    surface = extract_surface(*volume, fusion.least_weight, options.threads);
   }
-  surface = without_small_pieces(surface, stages.cleaning);
+  surface = without_small_pieces(surface, options.cleaning);
   if (surface.mesh.triangles.rows() == 0) {
     return fail(ErrorKind::no_result, "surface", "the views agree on no surface",
                 "check poses and masks, light and focus");
   }
   options.after_stage("surface");
   ReconstructedSurface result;
-  result.mesh = std::move(surface.mesh);
-  const double gap_mm = stages.fusion.voxel_mm * stages.fusion.truncation_voxels;
-  result.mesh.colors = blend_vertex_colors(result.mesh, *maps, views, gap_mm, options.threads);
-  options.after_stage("colours");
-  const double match_sd_px =
-      options.match_sd_px * static_cast<double>(1 << stages.depth.finest_level);
-  result.coverage =
-      measure_coverage(result.mesh, *maps, views, gap_mm, match_sd_px, options.threads);
-  options.after_stage("coverage");
-  result.depth_maps = *std::move(maps);
+  maps = {};  // gigabytes that nothing needs any more
+  // What lies this little behind the nearest surface may be that surface itself.
+  const double gap_mm = fusion.voxel_mm * fusion.truncation_voxels;
+  result.mesh = thinned(std::move(surface.mesh), options.edge_mm, fusion.voxel_mm);
+  {
+    const Sights sights(result.mesh, views, gap_mm, options.threads);
+    options.after_stage("sights");
+    result.mesh.colors =
+        SurfaceColors(result.mesh, sights, options.threads).vertex_colors(options.threads);
+    options.after_stage("colours");
+    const double match_sd_px =
+        options.match_sd_px * static_cast<double>(1 << options.depth.finest_level);
+    result.coverage = measure_coverage(result.mesh, sights, match_sd_px, options.threads);
+    options.after_stage("coverage");
+  }
+  if (options.texture) {
+    const double edge_mm =
+        std::max(options.edge_mm, options.textured_edge_voxels * fusion.voxel_mm);
+    const TriangleMesh mesh = thinned(result.mesh, edge_mm, fusion.voxel_mm);
+    options.after_stage("thinning");
+    const Sights sights(mesh, views, gap_mm, options.threads);
+    const SurfaceColors colors(mesh, sights, options.threads);
+    TextureOptions how = *options.texture;
+    how.threads = options.threads;
+    auto textured = make_texture(mesh, sights, colors, how);
+    if (!textured) return forward(textured);
+    result.textured = *std::move(textured);
+    options.after_stage("texture");
+  }
   progress.report(1.0, "surface");
   return result;
+}
+
+Result<ReconstructedSurface> reconstruct_surface(std::span<const StereoView> views,
+                                                 const SurfaceOptions& options,
+                                                 const Progress& progress) {
+  auto maps = find_depths(views, options, progress.part(0.02, 0.85));
+  if (!maps) return forward(maps);
+  return surface_of_depths(*std::move(maps), views, options, progress.part(0.85, 1.0));
 }
 
 }  // namespace skullstation

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "reconstruction/photogrammetry/fusion_volume.h"
 #include "reconstruction/photogrammetry/stereo_view.h"
 #include "reconstruction/photogrammetry/surface_cleaning.h"
+#include "reconstruction/photogrammetry/texture.h"
 
 namespace skullstation {
 
@@ -26,6 +28,12 @@ struct SurfaceOptions {
   DepthMapOptions depth;
   FusionOptions fusion;
   CleaningOptions cleaning;
+  /// Mean edge length of the surface [mm]; 0: as it was extracted, about the voxel's size.
+  double edge_mm = 0.0;
+  /// The textured surface is a coarser one, since its texture carries the fine detail; nothing:
+  /// no texture.
+  std::optional<TextureOptions> texture = TextureOptions{};
+  double textured_edge_voxels = 2.0;
   /// Standard deviation of a match [px of the depth maps]; for the estimated accuracy.
   double match_sd_px = 0.3;
   int threads = 0;  ///< 0: all; for every stage
@@ -41,12 +49,27 @@ struct SurfaceOptions {
 struct ReconstructedSurface {
   TriangleMesh mesh;  ///< table frame, mm; normals, colours
   Coverage coverage;  ///< of the mesh's vertices
-  std::vector<DepthMap> depth_maps;
+  std::optional<TexturedSurface> textured;
 };
 
-/// From photographs with known cameras and masks, all of one pass, to a metric surface: visual
-/// hull, depth maps, fusion, isosurface, colours, coverage. What no two views agree on stays open.
-/// The same bytes for any number of threads. Errors: those of the stages.
+/// The depth maps of all views of one pass: visual hull, then stereo. The same bytes for any number
+/// of threads. Errors: bad_input for fewer than 3 views, usage for views of several passes, those
+/// of the stages.
+Result<std::vector<DepthMap>> find_depths(std::span<const StereoView> views,
+                                          const SurfaceOptions& options,
+                                          const Progress& progress = {});
+
+/// One surface from depth maps and their views, of one pass or of several that were moved into one
+/// frame: fusion, isosurface, colours, coverage, texture. What no two views agree on stays open.
+/// The same bytes for any number of threads. Errors: those of the stages; no_result for an empty
+/// surface.
+Result<ReconstructedSurface> surface_of_depths(std::vector<DepthMap> maps,
+                                               std::span<const StereoView> views,
+                                               const SurfaceOptions& options,
+                                               const Progress& progress = {});
+
+/// From photographs with known cameras and masks, all of one pass, to a metric surface:
+/// find_depths(), then surface_of_depths().
 Result<ReconstructedSurface> reconstruct_surface(std::span<const StereoView> views,
                                                  const SurfaceOptions& options,
                                                  const Progress& progress = {});

@@ -157,7 +157,7 @@ Image8 halved(const Image8& image) {
     const std::uint8_t* upper = image.row(2 * y);
     const std::uint8_t* lower = image.row(2 * y + 1);
     std::uint8_t* out = half.row(y);
-    for (int x = 0; x < half.width; ++x) {
+    for (std::ptrdiff_t x = 0; x < half.width; ++x) {
       const int sum = upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1];
       out[x] = static_cast<std::uint8_t>((sum + 2) / 4);
     }

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
-#include "reconstruction/phantom/cube_cases.h"
+#include "reconstruction/mesh/cube_cases.h"
 
 namespace skullstation {
 
@@ -125,7 +125,7 @@ class Extractor {
             if (cells.distance[i] < 0.0f) inside |= 1 << corner;
           }
           if (!complete || inside == 0 || inside == 255) continue;
-          for (const std::array<int, 3>& cut : solid_cube_cases()[inside]) {
+          for (const std::array<int, 3>& cut : cube_cases(DiagonalCorners::stay_apart)[inside]) {
             piece.triangles.push_back({vertex_on(b, x, y, z, cut[0]), vertex_on(b, x, y, z, cut[1]),
                                        vertex_on(b, x, y, z, cut[2])});
           }
@@ -136,7 +136,7 @@ class Extractor {
 
   /// The vertex on an edge of the cell at (x, y, z).
   int vertex_on(int b, int x, int y, int z, int edge) const {
-    const int corner = kCubeEdges[edge][0];
+    const int corner = cube_edges[edge].corner;
     const int u = x + (corner & 1);
     const int v = y + (corner >> 1 & 1);
     const int w = z + (corner >> 2);

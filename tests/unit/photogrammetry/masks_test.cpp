@@ -143,6 +143,22 @@ TEST(Masks, NameAViewInWhichTheSpecimenWasMoved) {
   }
 }
 
+TEST(Masks, NameAViewOfAnotherObject) {
+  BallScene scene = ball_scene();
+  Ball other;
+  other.radius_mm = 35.0;
+  other.middle.z() = 40.0;
+  Random random(5);
+  photograph(other, 7, random, scene);
+  std::swap(scene.photographs[7], scene.photographs.back());
+  scene.photographs.pop_back();
+  const auto masks = find_masks(scene.views(), &scene.truth.board);
+  ASSERT_TRUE(masks) << masks.error().message();
+  for (std::size_t i = 0; i < masks->size(); ++i) {
+    EXPECT_EQ((*masks)[i].odd.empty(), i != 7) << i << ": " << (*masks)[i].odd;
+  }
+}
+
 TEST(Masks, SayWhyThereAreNone) {
   BallScene scene = ball_scene();
   const std::vector<MaskView> two(2);
