@@ -1,0 +1,63 @@
+#include "reconstruction/registration/head_sheet.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace skullstation {
+
+std::vector<bool> rim_of(const HeadTemplate& head) {
+  std::map<std::pair<int, int>, int> edges;
+  for (Eigen::Index f = 0; f < head.triangles.rows(); ++f) {
+    for (int i = 0; i < 3; ++i) {
+      ++edges[std::minmax(int{head.triangles(f, i)}, int{head.triangles(f, (i + 1) % 3)})];
+    }
+  }
+  std::vector<bool> rim(static_cast<std::size_t>(head.vertices.rows()), false);
+  for (const auto& [edge, count] : edges) {
+    if (count != 1) continue;
+    rim[static_cast<std::size_t>(edge.first)] = true;
+    rim[static_cast<std::size_t>(edge.second)] = true;
+  }
+  return rim;
+}
+
+HeadSheet::HeadSheet(const HeadTemplate& head, const Points3& vertices,
+                     const std::vector<bool>& rim)
+    : mesh_(surface_of(head, vertices)), bvh_(mesh_), rim_(rim) {}
+
+SheetHit HeadSheet::nearest(const Eigen::Vector3d& query) const {
+  const ClosestPoint closest = bvh_.closest(query);
+  SheetHit hit;
+  hit.place.corners = mesh_.triangles.row(closest.triangle);
+  const auto corner = [&](int i) -> Eigen::Vector3d {
+    return mesh_.vertices.row(hit.place.corners[i]);
+  };
+  const Eigen::Vector3d ab = corner(1) - corner(0);
+  const Eigen::Vector3d ac = corner(2) - corner(0);
+  const Eigen::Vector3d ap = closest.point - corner(0);
+  const Eigen::Vector3d normal = ab.cross(ac);
+  const double squared = normal.squaredNorm();
+  if (squared > 0.0) {
+    const double v = ap.cross(ac).dot(normal) / squared;
+    const double w = ab.cross(ap).dot(normal) / squared;
+    hit.place.weights = {1.0 - v - w, v, w};
+    hit.normal = normal / std::sqrt(squared);
+  }
+  hit.point = closest.point;
+  hit.distance_mm = closest.distance_mm;
+  for (int i = 0; i < 3; ++i) {
+    // Off the sheet's end the nearest point lies on its rim.
+    hit.beyond_edge = hit.beyond_edge || (rim_[static_cast<std::size_t>(hit.place.corners[i])] &&
+                                          hit.place.weights[i] > 0.999);
+    const int j = (i + 1) % 3;
+    hit.beyond_edge = hit.beyond_edge || (rim_[static_cast<std::size_t>(hit.place.corners[i])] &&
+                                          rim_[static_cast<std::size_t>(hit.place.corners[j])] &&
+                                          hit.place.weights[3 - i - j] < 1e-3);
+  }
+  return hit;
+}
+
+}  // namespace skullstation

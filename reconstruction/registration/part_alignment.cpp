@@ -1,0 +1,279 @@
+#include "reconstruction/registration/part_alignment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/units.h"
+#include "reconstruction/registration/affine_fit.h"
+#include "reconstruction/registration/point_icp.h"
+
+namespace skullstation {
+
+namespace {
+
+constexpr int kPointsOfPart = 1000;
+constexpr Eigen::Index kLeastSamples = 200;  ///< of the input, to look for a mandible in
+/// Distances beyond this count as this: what a part's cost is made of.
+constexpr double kTruncation_mm = 6.0;
+/// Where a bone costs more, it is not there: most of its points find nothing.
+constexpr double kFoundCost_mm2 = 0.6 * kTruncation_mm * kTruncation_mm;
+
+/// How far a part may leave its parent.
+struct Bounds {
+  double max_distance_mm;  ///< of pairs
+  double scale;            ///< between 1/scale and scale
+  double angle_deg;
+  double shift_mm;  ///< of the part's centroid
+  double least_overlap;
+};
+
+constexpr Bounds kBone{25.0, 1.25, 35.0, 35.0, 0.4};
+constexpr Bounds kGroup{8.0, 1.1, 10.0, 8.0, 0.4};
+constexpr Bounds kRegion{6.0, 1.1, 10.0, 6.0, 0.5};
+
+using Regions = std::vector<SkullRegion>;
+using enum SkullRegion;
+
+const std::vector<Regions>& groups() {
+  static const std::vector<Regions> all = {
+      {calvaria, occiput},
+      {base, temporal_left, temporal_right},
+      {zygoma_left, orbit_left},
+      {zygoma_right, orbit_right},
+      {nose, orbit_left, orbit_right},
+      {maxilla, upper_teeth},
+      {chin, lower_teeth},
+      {mandible_body_left, ramus_left},
+      {mandible_body_right, ramus_right},
+  };
+  return all;
+}
+
+OrientedPoints points_of(const SkullTemplate& skull, const TriangleMesh& surface,
+                         const Regions& regions) {
+  std::vector<int> members;
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    const auto at = static_cast<std::size_t>(v);
+    if (skull.outer[at] && std::ranges::count(regions, skull.region[at]) > 0) {
+      members.push_back(v);
+    }
+  }
+  const std::size_t stride = std::max<std::size_t>(1, members.size() / kPointsOfPart);
+  const auto count = static_cast<Eigen::Index>((members.size() + stride - 1) / stride);
+  OrientedPoints points;
+  points.positions.resize(count, 3);
+  points.normals.resize(count, 3);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const int v = members[static_cast<std::size_t>(i) * stride];
+    points.positions.row(i) = surface.vertices.row(v);
+    points.normals.row(i) = surface.normals.row(v);
+  }
+  return points;
+}
+
+/// What a part is laid on.
+struct Target {
+  const OrientedPoints& points;
+  const PointTree& tree;
+};
+
+/// Mean truncated squared distance of the points from the target where the normals agree [mm^2].
+double cost_of(const OrientedPoints& points, const Similarity3& transform, const Target& target) {
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < points.size(); ++i) {
+    const NearPoint near =
+        target.tree.nearest(transform * points.positions.row(i).transpose(), kTruncation_mm);
+    const bool agrees =
+        near.index >= 0 &&
+        target.points.normals.row(near.index)
+                .dot((transform.rotation * points.normals.row(i).transpose()).transpose()) > 0.5;
+    sum += agrees ? near.squared_distance : kTruncation_mm * kTruncation_mm;
+  }
+  return sum / static_cast<double>(std::max<Eigen::Index>(1, points.size()));
+}
+
+bool within(const Bounds& bounds, const Similarity3& now, const Similarity3& parent,
+            const Eigen::Vector3d& centroid) {
+  const double scale = now.scale / parent.scale;
+  const double angle_deg = degrees(now.rotation.angularDistance(parent.rotation));
+  return scale <= bounds.scale && scale >= 1.0 / bounds.scale && angle_deg <= bounds.angle_deg &&
+         (now * centroid - parent * centroid).norm() <= bounds.shift_mm;
+}
+
+std::optional<Similarity3> align_part(const OrientedPoints& points, const Target& target,
+                                      const Similarity3& parent,
+                                      const std::vector<Similarity3>& starts,
+                                      const Bounds& bounds) {
+  if (points.size() < 30) return std::nullopt;
+  const Eigen::Vector3d centroid = points.positions.colwise().mean();
+  std::optional<Similarity3> best;
+  double least = cost_of(points, parent, target);
+  for (const Similarity3& start : starts) {
+    PointIcpOptions options;
+    options.estimate_scale = true;
+    options.max_normal_angle_deg = 50.0;
+    options.tolerance_mm = 1e-2;
+    options.threads = 1;
+    options.max_distance_mm = bounds.max_distance_mm;
+    auto fit = align_points(points, target.points, target.tree, start, options);
+    if (!fit) continue;
+    options.max_distance_mm = 0.5 * bounds.max_distance_mm;
+    fit = align_points(points, target.points, target.tree, fit->target_from_source, options);
+    if (!fit || fit->overlap < bounds.least_overlap ||
+        !within(bounds, fit->target_from_source, parent, centroid)) {
+      continue;
+    }
+    const double cost = cost_of(points, fit->target_from_source, target);
+    if (cost >= least) continue;
+    least = cost;
+    best = fit->target_from_source;
+  }
+  return best;
+}
+
+/// The mandible closed and opened about the axis through its condyles.
+std::vector<Similarity3> mandible_starts(const SkullTemplate& skull, const TriangleMesh& surface,
+                                         const Eigen::Affine3d& cranium) {
+  std::vector<Similarity3> starts;
+  std::optional<Eigen::Vector3d> left;
+  std::optional<Eigen::Vector3d> right;
+  for (const TemplateLandmark& landmark : skull.landmarks) {
+    if (landmark.name == "condylion laterale left")
+      left = landmark.place.position(surface.vertices);
+    if (landmark.name == "condylion laterale right") {
+      right = landmark.place.position(surface.vertices);
+    }
+  }
+  if (!left || !right) return {Similarity3{}};
+  const Eigen::Vector3d hinge = cranium * Eigen::Vector3d(0.5 * (*left + *right));
+  const Eigen::Vector3d axis = (*left - *right).normalized();
+  for (const double opening_deg : {0.0, 10.0, 20.0}) {
+    for (const double drop_mm : {0.0, 10.0}) {  // a longer face, a thick disc in the joint
+      Similarity3 start;
+      start.rotation = Eigen::AngleAxisd(radians(opening_deg), axis);
+      start.translation = hinge - start.rotation * hinge - drop_mm * Eigen::Vector3d::UnitZ();
+      starts.push_back(start);
+    }
+  }
+  return starts;
+}
+
+Eigen::Affine3d affine(const Similarity3& similarity) {
+  Eigen::Affine3d result;
+  result.linear() = similarity.scale * similarity.rotation.toRotationMatrix();
+  result.translation() = similarity.translation;
+  return result;
+}
+
+/// The input without what lies on the cranium as it was found.
+OrientedPoints beyond_cranium(const SkullTemplate& skull, const TriangleMesh& surface,
+                              const Eigen::Affine3d& cranium, const InputSurface& input) {
+  constexpr double kOnCranium_mm = 4.0;
+  Points3 bone(skull.boundary_count, 3);
+  Eigen::Index count = 0;
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    if (bone_of(skull.region[static_cast<std::size_t>(v)]) != SkullBone::cranium) continue;
+    bone.row(count++) = (cranium * surface.vertices.row(v).transpose()).transpose();
+  }
+  bone.conservativeResize(count, 3);
+  const PointTree tree(bone);
+  OrientedPoints rest = input.samples();
+  count = 0;
+  for (Eigen::Index i = 0; i < input.samples().size(); ++i) {
+    if (tree.nearest(input.samples().positions.row(i), kOnCranium_mm).index >= 0) continue;
+    rest.positions.row(count) = input.samples().positions.row(i);
+    rest.normals.row(count++) = input.samples().normals.row(i);
+  }
+  rest.positions.conservativeResize(count, 3);
+  rest.normals.conservativeResize(count, 3);
+  return rest;
+}
+
+/// Both bones: first as they are, then stretched.
+void align_bones(const SkullTemplate& skull, const TriangleMesh& surface, const InputSurface& input,
+                 PartAlignment& result) {
+  std::array<Regions, 2> bones;
+  for (int r = 0; r < kSkullRegionCount; ++r) {
+    const auto region = static_cast<SkullRegion>(r);
+    bones[static_cast<std::size_t>(bone_of(region))].push_back(region);
+  }
+  result.bones.fill(Eigen::Affine3d::Identity());
+  const Target whole{input.samples(), input.sample_tree()};
+  // The cranium first; the mandible goes with it, and is looked for in what the cranium leaves.
+  for (std::size_t b = 0; b < bones.size(); ++b) {
+    const OrientedPoints own = points_of(skull, surface, bones[b]);
+    const Eigen::Affine3d parent = b == 0 ? Eigen::Affine3d::Identity() : result.bones[0];
+    const OrientedPoints points = transformed(parent, own);
+    std::optional<Similarity3> found;
+    if (b == 0) {
+      found = align_part(points, whole, Similarity3{}, {Similarity3{}}, kBone);
+    } else {
+      const OrientedPoints rest = beyond_cranium(skull, surface, parent, input);
+      if (rest.size() >= kLeastSamples) {
+        const PointTree tree(rest.positions);
+        found = align_part(points, {rest, tree}, Similarity3{},
+                           mandible_starts(skull, surface, parent), kBone);
+      }
+    }
+    const Similarity3 placed = found.value_or(Similarity3{});
+    result.bone_found[b] = cost_of(points, placed, whole) < kFoundCost_mm2;
+    ++result.parts;
+    result.accepted += found.has_value() ? 1 : 0;
+    result.bones[b] = affine(placed) * parent;
+    if (!result.bone_found[b]) continue;
+    for (const double reach_mm : {12.0, 6.0}) {
+      result.bones[b] = fit_affine(own, input, result.bones[b], reach_mm);
+    }
+  }
+}
+
+}  // namespace
+
+PartAlignment align_parts(const SkullTemplate& skull, const TriangleMesh& surface,
+                          const InputSurface& input, int threads) {
+  PartAlignment result;
+  align_bones(skull, surface, input, result);
+  TriangleMesh stretched = surface;
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    const auto bone = static_cast<std::size_t>(bone_of(skull.region[static_cast<std::size_t>(v)]));
+    stretched.vertices.row(v) =
+        (result.bones[bone] * surface.vertices.row(v).transpose()).transpose();
+  }
+  stretched.normals = vertex_normals(stretched);
+
+  const Target whole{input.samples(), input.sample_tree()};
+  struct Found {
+    Regions regions;
+    std::optional<Similarity3> transform;
+  };
+  const auto level = [&](std::vector<Found> parts, const Bounds& bounds) {
+    parallel_for(static_cast<int>(parts.size()), threads, [&](int p) {
+      Found& part = parts[static_cast<std::size_t>(p)];
+      const Similarity3& parent = result.regions[static_cast<std::size_t>(part.regions.front())];
+      part.transform =
+          align_part(points_of(skull, stretched, part.regions), whole, parent, {parent}, bounds);
+    });
+    for (const Found& part : parts) {
+      ++result.parts;
+      if (!part.transform) continue;
+      ++result.accepted;
+      for (const SkullRegion region : part.regions) {
+        result.regions[static_cast<std::size_t>(region)] = *part.transform;
+      }
+    }
+  };
+  std::vector<Found> parts;
+  for (const Regions& group : groups()) parts.push_back({group, std::nullopt});
+  level(std::move(parts), kGroup);
+  parts.clear();
+  for (int r = 0; r < kSkullRegionCount; ++r) {
+    parts.push_back({{static_cast<SkullRegion>(r)}, std::nullopt});
+  }
+  level(std::move(parts), kRegion);
+  return result;
+}
+
+}  // namespace skullstation

@@ -1,0 +1,109 @@
+#include "reconstruction/registration/skull_fit_quality.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+#include "reconstruction/distance/triangle_bvh.h"
+
+namespace skullstation {
+
+namespace {
+constexpr double kObserved_mm = 2.0;
+constexpr double kObservedAngle_deg = 60.0;
+/// Of the input's vertices; more tell no more.
+constexpr int kMeasured = 60000;
+constexpr int kChunk = 512;
+}  // namespace
+
+FitDistances distances_of(std::vector<double> distances_mm) {
+  FitDistances result;
+  result.points = static_cast<int>(distances_mm.size());
+  if (distances_mm.empty()) return result;
+  double squares = 0.0;
+  for (const double d : distances_mm) {
+    result.mean_mm += d;
+    squares += d * d;
+    result.max_mm = std::max(result.max_mm, d);
+  }
+  const auto count = static_cast<double>(distances_mm.size());
+  result.mean_mm /= count;
+  result.rms_mm = std::sqrt(squares / count);
+  const auto rank = distances_mm.begin() + static_cast<std::ptrdiff_t>(
+                                               0.95 * static_cast<double>(distances_mm.size() - 1));
+  std::nth_element(distances_mm.begin(), rank, distances_mm.end());
+  result.p95_mm = *rank;
+  return result;
+}
+
+void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
+                       const InputSurface& input, int threads, FittedSkull& fitted) {
+  const TriangleMesh surface = surface_of(skull, vertices);
+  const auto count = static_cast<std::size_t>(skull.boundary_count);
+  std::vector<char> observed(count, 0);
+  fitted.distance_mm.assign(count, 0.0);
+  parallel_for((skull.boundary_count + kChunk - 1) / kChunk, threads, [&](int chunk) {
+    for (int v = chunk * kChunk; v < std::min(skull.boundary_count, (chunk + 1) * kChunk); ++v) {
+      const auto at = static_cast<std::size_t>(v);
+      const InputHit any =
+          input.nearest_point(surface.vertices.row(v), surface.normals.row(v), 1e3, 180.0);
+      fitted.distance_mm[at] = any.valid ? any.distance_mm : 1e3;
+      observed[at] = skull.outer[at] && any.valid && any.distance_mm <= kObserved_mm &&
+                     input
+                         .nearest_point(surface.vertices.row(v), surface.normals.row(v),
+                                        kObserved_mm, kObservedAngle_deg)
+                         .valid;
+    }
+  });
+  fitted.observed.assign(observed.begin(), observed.end());
+  int outer = 0;
+  int seen = 0;
+  int mandible = 0;
+  int mandible_seen = 0;
+  for (std::size_t v = 0; v < count; ++v) {
+    if (!skull.outer[v]) continue;
+    const bool lower = bone_of(skull.region[v]) == SkullBone::mandible;
+    ++outer;
+    seen += observed[v];
+    mandible += lower ? 1 : 0;
+    mandible_seen += lower ? observed[v] : 0;
+  }
+  SkullFitQuality& quality = fitted.quality;
+  quality.observed_share = outer > 0 ? static_cast<double>(seen) / outer : 0.0;
+  quality.mandible_observed_share =
+      mandible > 0 ? static_cast<double>(mandible_seen) / mandible : 0.0;
+
+  const TriangleBvh bvh(surface);
+  const auto points = static_cast<int>(input.mesh().vertices.rows());
+  const int stride = std::max(1, points / kMeasured);
+  const int measured = (points + stride - 1) / stride;
+  std::vector<ClosestPoint> hits(static_cast<std::size_t>(measured));
+  parallel_for((measured + kChunk - 1) / kChunk, threads, [&](int chunk) {
+    for (int i = chunk * kChunk; i < std::min(measured, (chunk + 1) * kChunk); ++i) {
+      hits[static_cast<std::size_t>(i)] = bvh.closest(input.mesh().vertices.row(i * stride));
+    }
+  });
+  std::vector<double> facial;
+  std::vector<double> all;
+  for (const ClosestPoint& hit : hits) {
+    bool outside = true;
+    bool face = true;
+    for (int i = 0; i < 3; ++i) {
+      const auto v = static_cast<std::size_t>(skull.boundary(hit.triangle, i));
+      outside = outside && skull.outer[v];
+      face = face && is_facial(skull.region[v]);
+    }
+    if (!outside) continue;
+    all.push_back(hit.distance_mm);
+    if (face) facial.push_back(hit.distance_mm);
+  }
+  quality.facial = distances_of(std::move(facial));
+  quality.outer = distances_of(std::move(all));
+
+  const Eigen::ArrayXd shares = signed_volumes(skull.tetrahedra, vertices).array() /
+                                signed_volumes(skull.tetrahedra, skull.vertices).array();
+  quality.inverted_tetrahedra = static_cast<int>((shares <= 0.0).count());
+  quality.least_scaled_volume = shares.minCoeff();
+}
+
+}  // namespace skullstation

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <vector>
+
+#include "core/triangle_mesh.h"
+
+namespace skullstation {
+
+/// Which vertices lie on the outside: seen from far away in at least 8 % of the directions of their
+/// half space, weighted by the cosine. The inner surfaces of a skull see the outside only through
+/// its openings. \pre the mesh has normals
+std::vector<bool> outside_vertices(const TriangleMesh& mesh, int threads);
+
+}  // namespace skullstation
