@@ -1,0 +1,32 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/result.h"
+#include "reconstruction/statistics/joint_model.h"
+#include "reconstruction/statistics/person_facts.h"
+#include "reconstruction/statistics/population.h"
+#include "reconstruction/statistics/shape_model.h"
+
+namespace skullstation {
+
+struct JointScoreOptions {
+  int skull_modes = 12;  ///< that the joint model knows, at most
+  int head_modes = 20;
+
+  Result<void> validate() const;
+};
+
+/// Joint model of the subjects' coefficients and facts; `tissue` may be empty (0 rows: no such
+/// variables). A fact takes part if most subjects have it and it varies.
+Result<JointModel> joint_of(const ShapeModel& skull_model, std::span<const Points3> skulls,
+                            const ShapeModel& head_model, std::span<const Points3> heads,
+                            const Eigen::MatrixXd& tissue, std::span<const ModelSubject> subjects,
+                            const JointScoreOptions& options);
+
+/// What a joint model foretells of all its variables from the skull's coefficients [SD], as far as
+/// they are known, and the facts that are known.
+Belief foretold(const JointModel& joint, const Belief& skull, const PersonFacts& facts);
+
+}  // namespace skullstation

@@ -1,0 +1,194 @@
+#include "reconstruction/statistics/population.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "reconstruction/registration/point_tree.h"
+#include "reconstruction/registration/similarity_fit.h"
+
+namespace skullstation {
+
+namespace {
+
+using Eigen::Index;
+
+constexpr int alignment_rounds = 4;
+constexpr std::size_t least_complete = 10;
+constexpr double observation_sd_mm = 1.0;
+constexpr std::size_t observation_count = 2000;
+constexpr double independent_observations = 500.0;
+/// How far from the observed bone a completion still follows it.
+constexpr double transition_mm = 15.0;
+
+void transform(Points3& points, const Similarity3& target_from_source) {
+  for (Index v = 0; v < points.rows(); ++v) {
+    const Eigen::Vector3d moved = target_from_source * Eigen::Vector3d(points.row(v));
+    points.row(v) = moved;
+  }
+}
+
+Result<void> check(const SkullTemplate& skull, const HeadTemplate& head,
+                   const ModelSubject& subject) {
+  const auto bad = [&](std::string what) {
+    return fail(ErrorKind::bad_input, "subject " + subject.name, std::move(what),
+                "fit it again with this template");
+  };
+  if (subject.skull.rows() != skull.vertices.rows() ||
+      static_cast<int>(subject.skull_observed.size()) != skull.boundary_count ||
+      subject.tissue_mm.size() != skull.boundary_count) {
+    return bad(fmt::format("its skull has {} vertices, the template {}", subject.skull.rows(),
+                           skull.vertices.rows()));
+  }
+  if (subject.head.rows() != head.vertices.rows()) {
+    return bad(fmt::format("its head has {} vertices, the template {}", subject.head.rows(),
+                           head.vertices.rows()));
+  }
+  if (!subject.skull.allFinite() || !subject.head.allFinite()) {
+    return bad("a fitted vertex is not a number");
+  }
+  return {};
+}
+
+/// Outer vertices that were observed.
+std::vector<int> observed_outer(const SkullTemplate& skull, const std::vector<bool>& observed) {
+  std::vector<int> vertices;
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    const auto i = static_cast<std::size_t>(v);
+    if (skull.outer[i] && observed[i]) vertices.push_back(v);
+  }
+  return vertices;
+}
+
+}  // namespace
+
+Eigen::VectorXd vertex_areas(const TriangleMesh& mesh) {
+  Eigen::VectorXd areas = Eigen::VectorXd::Zero(mesh.vertices.rows());
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const Eigen::Vector3d a = mesh.vertices.row(mesh.triangles(t, 0));
+    const Eigen::Vector3d b = mesh.vertices.row(mesh.triangles(t, 1));
+    const Eigen::Vector3d c = mesh.vertices.row(mesh.triangles(t, 2));
+    const double third = (b - a).cross(c - a).norm() / 6.0;
+    for (int k = 0; k < 3; ++k) areas[mesh.triangles(t, k)] += third;
+  }
+  return areas;
+}
+
+Eigen::VectorXd skull_weights(const SkullTemplate& skull) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(skull.vertices.rows());
+  const Eigen::VectorXd areas =
+      vertex_areas({skull.vertices.topRows(skull.boundary_count), skull.boundary, {}, {}});
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    if (skull.outer[static_cast<std::size_t>(v)]) weights[v] = areas[v];
+  }
+  return weights;
+}
+
+Result<std::vector<ModelSubject>> aligned_population(const SkullTemplate& skull,
+                                                     const HeadTemplate& head,
+                                                     std::vector<ModelSubject> subjects) {
+  for (const ModelSubject& subject : subjects) {
+    if (const auto sound = check(skull, head, subject); !sound) return forward(sound);
+  }
+  if (subjects.empty()) return fail(ErrorKind::bad_input, "population", "has no subject");
+  const Eigen::VectorXd weights = skull_weights(skull);
+  Points3 reference = skull.vertices;
+  for (int round = 0; round < alignment_rounds; ++round) {
+    Points3 sum = Points3::Zero(reference.rows(), 3);
+    for (ModelSubject& subject : subjects) {
+      Eigen::VectorXd observed = weights;
+      for (int v = 0; v < skull.boundary_count; ++v) {
+        if (!subject.skull_observed[static_cast<std::size_t>(v)]) observed[v] = 0.0;
+      }
+      const auto pose = fit_similarity(subject.skull, reference, observed, FitScale::one);
+      if (!pose) {
+        Error error = pose.error();
+        error.where = "subject " + subject.name;
+        return tl::unexpected<Error>(std::move(error));
+      }
+      transform(subject.skull, *pose);
+      transform(subject.head, *pose);
+      sum += subject.skull;
+    }
+    // The mean goes back to where the template lies, or it would drift.
+    reference = sum / static_cast<double>(subjects.size());
+    const auto back = fit_similarity(reference, skull.vertices, weights, FitScale::one);
+    if (!back) return forward(back);
+    transform(reference, *back);
+    for (ModelSubject& subject : subjects) {
+      transform(subject.skull, *back);
+      transform(subject.head, *back);
+    }
+  }
+  return subjects;
+}
+
+double observed_share(const SkullTemplate& skull, const std::vector<bool>& observed) {
+  const auto outer = static_cast<double>(std::count(skull.outer.begin(), skull.outer.end(), true));
+  return static_cast<double>(observed_outer(skull, observed).size()) / outer;
+}
+
+Belief skull_belief(const SkullTemplate& skull, const ShapeModel& model, const Points3& vertices,
+                    const std::vector<bool>& observed) {
+  const std::vector<int> seen = observed_outer(skull, observed);
+  const std::size_t step = std::max<std::size_t>(1, seen.size() / observation_count);
+  const double used = std::ceil(static_cast<double>(seen.size()) / static_cast<double>(step));
+  // Neighbours err alike: all together tell no more than so many on their own.
+  const double sd_mm =
+      observation_sd_mm * std::sqrt(std::max(1.0, used / independent_observations));
+  std::vector<VertexObservation> observations;
+  for (std::size_t i = 0; i < seen.size(); i += step) {
+    observations.push_back({seen[i], vertices.row(seen[i]), Eigen::Vector3d::Zero(), sd_mm, sd_mm});
+  }
+  return updated(model, population_belief(model), observations);
+}
+
+Points3 completed_skull(const SkullTemplate& skull, const ShapeModel& model,
+                        const Points3& vertices, const std::vector<bool>& observed) {
+  const std::vector<int> seen = observed_outer(skull, observed);
+  const Points3 likely = shape_at(model, skull_belief(skull, model, vertices, observed).mean);
+  if (seen.empty()) return likely;
+  const Points3 seen_template = skull.vertices(seen, Eigen::all);
+  const PointTree tree(seen_template);
+  Points3 result = vertices;
+  for (Index v = 0; v < result.rows(); ++v) {
+    if (v < skull.boundary_count && observed[static_cast<std::size_t>(v)]) continue;
+    Eigen::RowVector3d offset = Eigen::RowVector3d::Zero();
+    double weight_sum = 0.0;
+    double nearest_squared = std::numeric_limits<double>::infinity();
+    for (const NearPoint& near : tree.nearest(skull.vertices.row(v).transpose(), 12)) {
+      const double weight = 1.0 / (near.squared_distance + 1.0);
+      const int from = seen[static_cast<std::size_t>(near.index)];
+      offset += weight * (vertices.row(from) - likely.row(from));
+      weight_sum += weight;
+      nearest_squared = std::min(nearest_squared, near.squared_distance);
+    }
+    result.row(v) =
+        likely.row(v) + std::exp(-std::sqrt(nearest_squared) / transition_mm) * offset / weight_sum;
+  }
+  return result;
+}
+
+void complete_skulls(const SkullTemplate& skull, std::vector<ModelSubject>& subjects,
+                     double complete_share) {
+  std::vector<Points3> whole;
+  std::vector<ModelSubject*> partial;
+  for (ModelSubject& subject : subjects) {
+    if (observed_share(skull, subject.skull_observed) >= complete_share) {
+      whole.push_back(subject.skull);
+    } else {
+      partial.push_back(&subject);
+    }
+  }
+  if (whole.size() < least_complete || partial.empty()) return;
+  const auto model = build_shape_model(whole, skull_weights(skull));
+  if (!model) return;
+  for (ModelSubject* subject : partial) {
+    subject->skull = completed_skull(skull, *model, subject->skull, subject->skull_observed);
+  }
+}
+
+}  // namespace skullstation
