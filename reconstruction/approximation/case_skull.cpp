@@ -1,0 +1,92 @@
+#include "reconstruction/approximation/case_skull.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "reconstruction/registration/similarity_fit.h"
+#include "reconstruction/statistics/population.h"
+
+namespace skullstation {
+
+namespace {
+
+constexpr int pose_rounds = 4;
+/// Error of an observed vertex: the fit's, and the correspondence's along the surface.
+constexpr double observed_sd_mm = 0.5;
+constexpr double strange = 3.0;
+constexpr double too_strange = 8.0;
+constexpr double least_observed_share = 0.15;
+
+}  // namespace
+
+Result<CaseSkull> fit_case_skull(const FaceModel& model, const TriangleMesh& input,
+                                 const SkullRegistrationOptions& options,
+                                 const Progress& progress) {
+  const auto fit = register_skull(model.skull_template, input, options, progress);
+  if (!fit) return forward(fit);
+  const SkullTemplate& skull = model.skull_template;
+  CaseSkull result;
+  result.observed = fit->observed;
+  result.quality = fit->quality;
+  const double share = observed_share(skull, fit->observed);
+  if (share < least_observed_share) {
+    return fail(ErrorKind::bad_input, "input skull",
+                fmt::format("shows only {:.0f} % of a skull's outside", 100.0 * share),
+                "scan more of it");
+  }
+
+  // Pose against what the model makes of the shape, in turns: size is kept, since it tells.
+  Eigen::VectorXd weights = skull_weights(skull);
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    if (!fit->observed[static_cast<std::size_t>(v)]) weights[v] = 0.0;
+  }
+  Points3 likely = unflattened(model.skull.mean);
+  Similarity3 anatomical_from_input;
+  const double unit = options.unit_unknown ? 1.0 / fit->input_from_template.scale : 1.0;
+  for (int round = 0; round < pose_rounds; ++round) {
+    const auto pose = fit_similarity(fit->vertices * unit, likely, weights, FitScale::one);
+    if (!pose) return forward(pose);
+    anatomical_from_input = *pose;
+    anatomical_from_input.scale *= unit;
+    result.vertices = fit->vertices;
+    for (Eigen::Index v = 0; v < result.vertices.rows(); ++v) {
+      const Eigen::Vector3d moved = anatomical_from_input * Eigen::Vector3d(fit->vertices.row(v));
+      result.vertices.row(v) = moved;
+    }
+    result.belief = skull_belief(skull, model.skull, result.vertices, fit->observed);
+    likely = shape_at(model.skull, result.belief.mean);
+  }
+  result.anatomical_from_input = anatomical_from_input;
+  result.vertices = completed_skull(skull, model.skull, result.vertices, fit->observed);
+  result.sd_mm = vertex_sd_mm(model.skull, result.belief).head(skull.boundary_count);
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    result.sd_mm[v] = fit->observed[static_cast<std::size_t>(v)]
+                          ? observed_sd_mm
+                          : std::hypot(result.sd_mm[v], std::sqrt(model.skull.noise_variance));
+  }
+  result.strangeness =
+      result.belief.mean.norm() /
+      std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, model.skull.mode_count())));
+  if (result.strangeness > too_strange) {
+    return fail(ErrorKind::bad_input, "input skull",
+                fmt::format("lies {:.1f} standard deviations from the model's skulls: it is no "
+                            "adult human skull in millimetres",
+                            result.strangeness),
+                "check the file and its unit");
+  }
+  if (result.strangeness > strange) {
+    result.warnings.push_back(
+        fmt::format("The skull lies {:.1f} standard deviations from those that the model was made "
+                    "from: the face is doubtful.",
+                    result.strangeness));
+  }
+  if (share < 0.9) {
+    result.warnings.push_back(fmt::format(
+        "{:.0f} % of the skull's outside was observed; the rest was completed from the model.",
+        100.0 * share));
+  }
+  return result;
+}
+
+}  // namespace skullstation

@@ -1,0 +1,249 @@
+#include "reconstruction/approximation/face_estimate.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "core/parallel.h"
+#include "reconstruction/registration/point_tree.h"
+#include "reconstruction/statistics/head_from_skull.h"
+
+namespace skullstation {
+
+namespace {
+
+using Eigen::Index;
+
+/// What the tissue model's modes leave over errs alike over a centimetre or two: all the face's
+/// vertices together tell no more of it than so many on their own.
+constexpr double independent_points = 300.0;
+/// Beyond this a vertex of the head does not belong to the bone below [mm].
+constexpr double max_gap_mm = 25.0;
+/// The way from bone to skin runs outwards from both.
+constexpr double least_cosine = 0.3;
+constexpr double own_depth_sd_mm = 0.3;
+constexpr double least_depth_sd_mm = 0.5;
+constexpr int candidates = 150;
+
+bool rests_on_bone(HeadRegion region) {
+  return region == HeadRegion::face || region == HeadRegion::scalp;
+}
+
+/// Head and tissue together: what is known of the head's coefficients, then the tissue's.
+struct HeadAndTissue {
+  Belief both;
+  Index head_modes = 0;
+
+  Belief head() const {
+    return {both.mean.head(head_modes), both.covariance.topLeftCorner(head_modes, head_modes)};
+  }
+  Belief tissue() const {
+    const Index modes = both.mean.size() - head_modes;
+    return {both.mean.tail(modes), both.covariance.bottomRightCorner(modes, modes)};
+  }
+};
+
+/// What the joint model foretells of both.
+HeadAndTissue jointly(const FaceModel& model, const Belief& belief) {
+  std::vector<std::string> names = coefficient_names("head", model.head.mode_count());
+  std::ranges::copy(coefficient_names("tissue", model.tissue.mode_count()),
+                    std::back_inserter(names));
+  return {belief_about(model.joint, belief, names), model.head.mode_count()};
+}
+
+/// Depths over the bone as the head's fit sees them.
+struct Depths {
+  Eigen::VectorXd mm;      ///< skull surface vertices; NaN: no sphere
+  Eigen::VectorXd sd_mm;   ///< what the tissue's coefficients leave over
+  Eigen::MatrixXd per_sd;  ///< vertices x #tissue modes: change for each standard deviation [mm]
+};
+
+/// Each vertex of the head over bone lies on the surface of the sphere that reaches nearest to it,
+/// as far as its radius is known: head and radii are estimated together, so that an error which
+/// all depths share is not mistaken for knowledge. Solved in rounds, since which sphere it is
+/// depends on the head.
+HeadAndTissue drawn_to_spheres(const FaceModel& model, const HeadAndTissue& prior,
+                               const TriangleMesh& bone, const Depths& depths, int rounds,
+                               int threads) {
+  std::vector<Index> spheres;
+  for (Index v = 0; v < depths.mm.size(); ++v) {
+    if (!std::isnan(depths.mm[v])) spheres.push_back(v);
+  }
+  const PointTree tree(bone.vertices(spheres, Eigen::all));
+  const Eigen::MatrixXd head_modes = model.head.scaled_modes();
+  const Index tissue_modes = depths.per_sd.cols();
+  const Index count = prior.both.mean.size();
+  const auto head_vertices = static_cast<int>(model.head.vertex_count());
+  const Eigen::MatrixXd prior_information = Eigen::LLT<Eigen::MatrixXd>(prior.both.covariance)
+                                                .solve(Eigen::MatrixXd::Identity(count, count));
+
+  HeadAndTissue state = prior;
+  for (int round = 0; round < rounds; ++round) {
+    const Points3 head = shape_at(model.head, state.both.mean.head(state.head_modes));
+    const Points3 normals = vertex_normals({head, model.head_template.triangles, {}, {}});
+    const Eigen::VectorXd tissue = state.both.mean.tail(tissue_modes);
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(head_vertices, count);
+    Eigen::VectorXd values = Eigen::VectorXd::Zero(head_vertices);
+    Eigen::VectorXd weights = Eigen::VectorXd::Zero(head_vertices);
+    parallel_for(head_vertices, threads, [&](int v) {
+      if (!rests_on_bone(model.head_template.region[static_cast<std::size_t>(v)])) return;
+      const Eigen::Vector3d at = head.row(v);
+      Index nearest = -1;
+      double least_gap = max_gap_mm;
+      for (const NearPoint& near : tree.nearest(at, candidates)) {
+        const Index sphere = spheres[static_cast<std::size_t>(near.index)];
+        const double radius = depths.mm[sphere] + depths.per_sd.row(sphere).dot(tissue);
+        const double gap = std::sqrt(near.squared_distance) - radius;
+        if (gap < least_gap) {
+          least_gap = gap;
+          nearest = sphere;
+        }
+      }
+      if (nearest < 0) return;
+      const Eigen::Vector3d from = bone.vertices.row(nearest);
+      const Eigen::Vector3d way = (at - from).normalized();
+      if (way.dot(normals.row(v)) < least_cosine || way.dot(bone.normals.row(nearest)) < 0.0)
+        return;
+      // way . head(b) - radius(z) = way . bone, linear in both.
+      rows.row(v).head(state.head_modes) = way.transpose() * head_modes.middleRows<3>(3 * Index{v});
+      rows.row(v).tail(tissue_modes) = -depths.per_sd.row(nearest);
+      values[v] =
+          way.dot(from) + depths.mm[nearest] - way.dot(model.head.mean.segment<3>(3 * Index{v}));
+      const double sd = std::max(depths.sd_mm[nearest], least_depth_sd_mm);
+      weights[v] = 1.0 / (sd * sd + model.head.noise_variance);
+    });
+    const double seen = static_cast<double>((weights.array() > 0.0).count());
+    weights *= std::min(1.0, independent_points / std::max(1.0, seen));
+    const Eigen::MatrixXd weighted = rows.transpose() * weights.asDiagonal();
+    const Eigen::LLT<Eigen::MatrixXd> factor(prior_information + weighted * rows);
+    state.both.mean = factor.solve(prior_information * prior.both.mean + weighted * values);
+    state.both.covariance = factor.solve(Eigen::MatrixXd::Identity(count, count));
+  }
+  return state;
+}
+
+/// How the head follows a variable of the joint model when what is known stays as it is.
+FaceVariation variation_along(const FaceModel& model, const Belief& belief,
+                              const std::string& name) {
+  const int at = *model.joint.index_of(name);
+  FaceVariation variation;
+  variation.name = name;
+  variation.sd_unit = std::sqrt(model.joint.covariance(at, at));
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(model.head.mode_count());
+  const double variance = belief.covariance(at, at);
+  const std::vector<std::string> names = coefficient_names("head", step.size());
+  for (Index k = 0; k < step.size(); ++k) {
+    const auto head = model.joint.index_of(names[static_cast<std::size_t>(k)]);
+    if (head) step[k] = belief.covariance(*head, at) / variance * variation.sd_unit;
+  }
+  variation.per_sd_mm = shape_at(model.head, step) - unflattened(model.head.mean);
+  return variation;
+}
+
+double factor_of(const std::vector<BandFactor>& bands, std::string_view region) {
+  const auto found = std::ranges::find(bands, region, &BandFactor::region);
+  if (found != bands.end()) return found->factor;
+  // Without a calibration a Gaussian's own 80 %.
+  return 1.2816;
+}
+
+}  // namespace
+
+Result<void> FaceOptions::validate() const {
+  if (const auto sound = facts.validate(); !sound) return sound;
+  if (const auto sound = spheres.validate(); !sound) return sound;
+  if (rounds < 1) return fail(ErrorKind::bad_input, "face, rounds", "must be at least 1");
+  return {};
+}
+
+Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skull,
+                                   const FaceOptions& options, const Progress& progress) {
+  if (const auto sound = options.validate(); !sound) return forward(sound);
+  const int surface_count = model.skull_template.boundary_count;
+  if (options.tissue == TissueChoice::measured && options.measured_mm.size() != surface_count) {
+    return fail(ErrorKind::bad_input, "measured tissue",
+                fmt::format("has {} depths, the skull {} surface vertices",
+                            options.measured_mm.size(), surface_count));
+  }
+  FaceEstimate face;
+  const Belief belief = foretold(model.joint, skull.belief, options.facts);
+
+  progress.report(0.0, "tissue");
+  const Index tissue_modes = model.tissue.mode_count();
+  HeadAndTissue prior{population_belief(model.head), model.head.mode_count()};
+  Depths depths;
+  switch (options.tissue) {
+    case TissueChoice::conditional: {
+      prior = jointly(model, belief);
+      const Belief tissue = prior.tissue();
+      face.tissue_mm = expected_tissue(model.tissue, tissue);
+      face.tissue_sd_mm = tissue_sd_mm(model.tissue, tissue);
+      // Linear round the expected depths: the logarithm's modes times the depth.
+      depths.per_sd = face.tissue_mm.asDiagonal() * model.tissue.modes;
+      depths.mm = face.tissue_mm - depths.per_sd * tissue.mean;
+      depths.sd_mm = face.tissue_mm.cwiseProduct(model.tissue.noise_sd);
+      break;
+    }
+    case TissueChoice::population:
+      face.tissue_mm = expected_tissue(model.tissue, population_tissue(model.tissue));
+      face.tissue_sd_mm = tissue_sd_mm(model.tissue, population_tissue(model.tissue));
+      break;
+    case TissueChoice::measured:
+      face.tissue_mm = options.measured_mm;
+      face.tissue_sd_mm =
+          options.measured_mm.array().isNaN().select(options.measured_mm, own_depth_sd_mm);
+      break;
+  }
+  if (options.tissue != TissueChoice::conditional) {
+    // The paper's way: the spheres are taken as they are.
+    depths = {face.tissue_mm, Eigen::VectorXd::Constant(surface_count, own_depth_sd_mm),
+              Eigen::MatrixXd(surface_count, 0)};
+  } else if (tissue_modes > 0) {
+    for (Index v = 0; v < depths.per_sd.rows(); ++v) {
+      if (std::isnan(depths.mm[v])) depths.per_sd.row(v).setZero();
+    }
+  }
+
+  progress.report(0.2, "sphere model");
+  const TriangleMesh bone = surface_of(model.skull_template, skull.vertices.topRows(surface_count));
+  SphereModelOptions sphere_options = options.spheres;
+  sphere_options.threads = options.threads;
+  auto spheres = sphere_model(bone.vertices,
+                              smoothed_depths(bone, face.tissue_mm, options.spheres.smoothing_mm),
+                              sphere_options);
+  if (!spheres) return forward(spheres);
+  face.spheres = *std::move(spheres);
+  if (progress.stop.stop_requested()) {
+    return fail(ErrorKind::cancelled, "face", "stopped");
+  }
+
+  progress.report(0.5, "head");
+  depths.mm = smoothed_depths(bone, depths.mm, options.spheres.smoothing_mm);
+  face.belief =
+      drawn_to_spheres(model, prior, bone, depths, options.rounds, options.threads).head();
+  face.head = shape_at(model.head, face.belief.mean);
+  const Points3 normals = vertex_normals({face.head, model.head_template.triangles, {}, {}});
+  // The bands were calibrated on what the joint model foretells from the skull; how much narrower
+  // the spheres make them is not known from left-out subjects, so that it is not claimed.
+  face.sd_mm = sd_along_normals_mm(model.head, prior.head().covariance, normals);
+  face.band_mm.resize(face.sd_mm.size());
+  for (Index v = 0; v < face.sd_mm.size(); ++v) {
+    const HeadRegion region = model.head_template.region[static_cast<std::size_t>(v)];
+    face.band_mm[v] = factor_of(model.bands, to_string(region)) * face.sd_mm[v];
+    face.from_bone.push_back(rests_on_bone(region));
+  }
+  for (const std::string& name : coefficient_names("tissue", model.tissue.mode_count())) {
+    if (model.joint.index_of(name)) {
+      face.variations.push_back(variation_along(model, belief, name));
+    }
+  }
+  if (model.joint.index_of("body mass index") && !options.facts.body_mass_index) {
+    face.variations.push_back(variation_along(model, belief, "body mass index"));
+  }
+  return face;
+}
+
+}  // namespace skullstation

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <vector>
+
+#include "core/progress.h"
+#include "core/result.h"
+#include "reconstruction/approximation/case_skull.h"
+#include "reconstruction/approximation/sphere_model.h"
+#include "reconstruction/statistics/face_model.h"
+#include "reconstruction/statistics/person_facts.h"
+
+namespace skullstation {
+
+/// Where the depths of the soft tissue come from.
+enum class TissueChoice {
+  conditional,  ///< the joint model, given skull and facts
+  population,   ///< the mean over all subjects, as in the paper
+  measured      ///< the subject's own, for tests of the method
+};
+
+struct FaceOptions {
+  TissueChoice tissue = TissueChoice::conditional;
+  Eigen::VectorXd measured_mm;  ///< skull surface vertices, NaN: unknown; for `measured`
+  PersonFacts facts;
+  SphereModelOptions spheres;
+  int rounds = 6;   ///< of correspondences between head and sphere model
+  int threads = 0;  ///< 0: all
+
+  Result<void> validate() const;
+};
+
+/// One direction in which the face may differ: added to the head for each standard deviation.
+struct FaceVariation {
+  std::string name;      ///< "tissue 1", "body mass index"
+  Points3 per_sd_mm;     ///< head vertices x 3
+  double sd_unit = 1.0;  ///< what a standard deviation is in the variable's own unit
+};
+
+/// A face, how it may vary, and how far it may be off. Anatomical frame.
+struct FaceEstimate {
+  Eigen::VectorXd tissue_mm;     ///< skull surface vertices, NaN where not modelled
+  Eigen::VectorXd tissue_sd_mm;  ///< same
+  TriangleMesh spheres;
+  Points3 head;                 ///< head template's vertices x 3
+  Belief belief;                ///< about the head model's coefficients
+  Eigen::VectorXd sd_mm;        ///< head vertices: along the normal
+  Eigen::VectorXd band_mm;      ///< half width of the calibrated 80 % band
+  std::vector<bool> from_bone;  ///< head vertices whose depth over bone carries them; the others
+                                ///< (nose, lips, eyes, ears) follow from the model alone
+  std::vector<FaceVariation> variations;
+};
+
+/// The face over a case's skull (Gietzen et al. 2019; the joint model of docs/faces.md). Fails
+/// with `bad_input` for facts out of range, `cancelled` on request.
+Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skull,
+                                   const FaceOptions& options = {}, const Progress& progress = {});
+
+}  // namespace skullstation
