@@ -60,6 +60,25 @@ void add_commands(CLI::App& app, Command& chosen) {
                      scan.add_option("--case", o.case_number, "case number");
                    });
 
+  add<ReconstructCommand>(
+      app, "reconstruct", "make a metric surface of a session's photographs", chosen,
+      [](CLI::App& reconstruct, ReconstructCommand& o) {
+        reconstruct.add_option("SESSION", o.session, "the session's folder")->required();
+        reconstruct.add_option("--out", o.out, "folder for the results; must not exist yet")
+            ->required();
+        reconstruct.add_option("--poses", o.poses, "where the cameras' poses come from")
+            ->capture_default_str()
+            ->check(CLI::IsMember({"auto", "board", "given", "sfm"}));
+        reconstruct
+            .add_option("--camera-radius-mm", o.camera_radius_mm,
+                        "distance of the first camera from the table's axis: the scale, where "
+                        "neither board nor given poses tell it")
+            ->check(CLI::PositiveNumber);
+        reconstruct.add_option("--quality", o.quality, "the finer, the slower")
+            ->capture_default_str()
+            ->check(CLI::IsMember({"draft", "standard", "fine"}));
+      });
+
   CLI::App* calibrate = app.add_subcommand("calibrate", "measure cameras and table");
   calibrate->require_subcommand(1);
   add<CalibrateCameraCommand>(
@@ -175,6 +194,109 @@ void add_commands(CLI::App& app, Command& chosen) {
         phantom.add_option("--edge", o.edge_mm, "length of the surfaces' edges, in mm")
             ->capture_default_str()
             ->check(CLI::Range(0.5, 5.0));
+        phantom
+            .add_option("--mandible-opening", o.mandible_opening_deg,
+                        "turn of the mandible, in degrees; the lips stay closed")
+            ->check(CLI::Range(0.0, 8.0));
+        phantom.add_flag("--ct", o.ct, "write the CT volume, too (ct.nii.gz)");
+        phantom.add_flag("--dicom", o.dicom, "write the CT as a DICOM series (folder ct)");
+        phantom.add_option("--spacing", o.spacing_mm, "of the CT's voxels: X Y Z, in mm")
+            ->expected(3)
+            ->check(CLI::Range(0.2, 10.0));
+        phantom
+            .add_option("--flaws", o.flaws,
+                        "of the CT: cropped-calvaria, cropped-nose, head-rest, table, metal, "
+                        "padding")
+            ->delimiter(',');
+        phantom.add_flag("--specimen", o.specimen,
+                         "write the stained bone as a specimen for the simulated station "
+                         "(specimen.ply)");
+        phantom
+            .add_option("--damage", o.damage,
+                        "of the specimen: missing-mandible, missing-calvaria, hole")
+            ->delimiter(',');
+      });
+
+  CLI::App* templates = app.add_subcommand("template", "the templates of skull and head");
+  templates->require_subcommand(1);
+  add<TemplateBuildCommand>(
+      *templates, "build", "make both from the canonical phantom", chosen,
+      [](CLI::App& build, TemplateBuildCommand& o) {
+        build.add_option("--out", o.out, "file")->required();
+        build.add_option("--surfaces", o.pictures, "folder for both surfaces, coloured by region");
+        build
+            .add_option("--skull-edge", o.skull_edge_mm, "length of the facial bone's edges, in mm")
+            ->capture_default_str()
+            ->check(CLI::Range(1.0, 12.0));
+        build.add_option("--head-edge", o.head_edge_mm, "length of the face's edges, in mm")
+            ->capture_default_str()
+            ->check(CLI::Range(1.5, 15.0));
+      });
+
+  CLI::App* fit = app.add_subcommand("fit", "registration alone: the template on a surface");
+  fit->require_subcommand(1);
+  add<FitSkullCommand>(
+      *fit, "skull", "the template skull on a skull, scanned or from CT", chosen,
+      [](CLI::App& skull, FitSkullCommand& o) {
+        skull.add_option("MESH", o.mesh, "PLY, OBJ or STL, in mm")->required();
+        skull.add_option("--template", o.templates, "file made by template build")->required();
+        skull.add_option("--out", o.out, "folder")->required();
+        skull.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
+        skull.add_option("--regularizer", o.regularizer, "what keeps the template's shape")
+            ->transform(CLI::CheckedTransformer(std::map<std::string, SkullRegularizer>{
+                {"smooth", SkullRegularizer::smooth},
+                {"projected-volume", SkullRegularizer::projected_volume},
+                {"volume", SkullRegularizer::volume}}));
+      });
+  add<FitHeadCommand>(
+      *fit, "head", "the template head on a skin surface", chosen,
+      [](CLI::App& head, FitHeadCommand& o) {
+        head.add_option("MESH", o.mesh, "PLY, OBJ or STL, in mm")->required();
+        head.add_option("--template", o.templates, "file made by template build")->required();
+        head.add_option("--out", o.out, "folder")->required();
+        head.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
+      });
+
+  CLI::App* model = app.add_subcommand("model", "statistical models of skull, tissue and head");
+  model->require_subcommand(1);
+  add<ModelBuildCommand>(
+      *model, "build", "a model file from subject folders", chosen,
+      [](CLI::App& build, ModelBuildCommand& o) {
+        build.add_option("--subjects", o.subjects, "folder of subject folders")->required();
+        build.add_option("--template", o.templates, "file made by template build")->required();
+        build.add_option("--out", o.out, "model file (.h5)")->required();
+        build.add_option("--fits", o.fits, "folder that keeps finished fits")->required();
+        build.add_option("--card", o.card, "what the subjects are, in plain words")->required();
+        build.add_flag("--allow-failures", o.allow_failures, "leave out who can't be fitted");
+        build.add_option("--skull-modes", o.skull_modes, "at most")->capture_default_str();
+        build.add_option("--head-modes", o.head_modes, "at most")->capture_default_str();
+      });
+  add<ModelEvaluateCommand>(
+      *model, "evaluate", "leave one subject out at a time: how good are the models?", chosen,
+      [](CLI::App& evaluate, ModelEvaluateCommand& o) {
+        evaluate.add_option("--subjects", o.subjects, "folder of subject folders")->required();
+        evaluate.add_option("--template", o.templates, "file made by template build")->required();
+        evaluate.add_option("--fits", o.fits, "folder that keeps finished fits")->required();
+        evaluate.add_flag("--allow-failures", o.allow_failures, "leave out who can't be fitted");
+      });
+  add<ModelInfoCommand>(*model, "info", "what a model file holds", chosen,
+                        [](CLI::App& info, ModelInfoCommand& o) {
+                          info.add_option("MODEL", o.model, "model file")->required();
+                        });
+
+  add<ApproximateCommand>(
+      app, "approximate", "from a skull to a face with its variants and uncertainty", chosen,
+      [](CLI::App& approximate, ApproximateCommand& o) {
+        approximate.add_option("SKULL", o.skull, "PLY, OBJ or STL, in mm")->required();
+        approximate.add_option("--model", o.model, "model file")->required();
+        approximate.add_option("--out", o.out, "case folder, new")->required();
+        approximate.add_option("--sex", o.sex, "male or female, if known")
+            ->check(CLI::IsMember({"male", "female"}));
+        approximate.add_option("--age", o.age_years, "years, if known");
+        approximate.add_option("--bmi", o.body_mass_index, "body mass index, if known");
+        approximate.add_flag("--mean-tissue", o.mean_tissue,
+                             "the population's mean depths, as in the paper");
+        approximate.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
       });
 
   add<DoctorCommand>(app, "doctor", "check devices, space and calibration; say what to mend",

@@ -5,12 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/calibration/calibration_file.h"
-#include "capture/calibration/camera_calibration.h"
 #include "capture/calibration/table_calibration.h"
 #include "capture/cameras/replay_camera.h"
 #include "core/session/image_file.h"
 #include "daemon/cli/commands.h"
-#include "daemon/station/scan_workflow.h"
+#include "daemon/station/calibration_workflow.h"
 #include "daemon/station/station.h"
 
 namespace skullstation {
@@ -21,26 +20,13 @@ namespace {
 
 // ------------------------------------------------------------------------------------- camera --
 
-/// Pictures of the hand-held board, and what they were taken with.
-struct BoardPictures {
-  std::vector<CalibrationView> views;
-  int width = 0;
-  int height = 0;
-  std::string device;
-
-  void add(std::string name, const Image8& image, const CharucoBoard& board) {
-    width = image.width;
-    height = image.height;
-    views.push_back({std::move(name), detect_board(image, board)});
-  }
-};
-
 Result<BoardPictures> read_pictures(const std::filesystem::path& folder, const CharucoBoard& board,
                                     const Progress& progress) {
   const auto files = pictures_in(folder);
   if (!files) return forward(files);
   BoardPictures pictures;
   pictures.device = "photographs in " + folder.string();
+  pictures.taken = SystemClock().utc_now();
   for (std::size_t i = 0; i < files->size(); ++i) {
     const std::filesystem::path& file = (*files)[i];
     progress.report(static_cast<double>(i) / static_cast<double>(files->size()),
@@ -58,36 +44,6 @@ Result<BoardPictures> read_pictures(const std::filesystem::path& folder, const C
   return pictures;
 }
 
-/// Takes the pictures now: the operator holds the board and presses the button for each; the
-/// simulated operator holds it as calibration_poses() says.
-Result<BoardPictures> take_pictures(const StationConfig& config, Station& station,
-                                    StationCamera& camera, const Progress& progress) {
-  const auto poses =
-      calibration_poses(simulated_lens(camera.config), camera.config.simulated.distance_mm);
-  BoardPictures pictures;
-  pictures.device = device_name(*camera.camera);
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const std::string name = fmt::format("view {} of {}", i + 1, poses.size());
-    progress.report(static_cast<double>(i) / static_cast<double>(poses.size()), name);
-    if (station.room) {
-      station.room->hold_board(camera.config, poses[i]);
-    } else {
-      fmt::print(stderr,
-                 "\n{}: hold the board aslant, in another direction and part of the picture each "
-                 "time, near and far in turn; then press the button.\n",
-                 name);
-      if (const auto ready = wait_for_confirmation(station.hardware, progress.stop); !ready) {
-        return forward(ready);
-      }
-    }
-    const auto frame =
-        camera.camera->frame_after(station.clock->now(), config.scan.frame_timeout, progress.stop);
-    if (!frame) return forward(frame);
-    pictures.add(name, frame->image, config.board);
-  }
-  return pictures;
-}
-
 Result<std::string> chosen_camera(const StationConfig& config, const std::string& id) {
   if (id.empty() && config.cameras.size() == 1) return config.cameras.front().id;
   std::vector<std::string> known;
@@ -100,20 +56,13 @@ Result<std::string> chosen_camera(const StationConfig& config, const std::string
               fmt::format("use one of: {}", fmt::join(known, ", ")));
 }
 
-Result<BoardPictures> pictures_for(const CalibrateCameraCommand& command, StationConfig config,
-                                   const std::string& id, UtcTime& taken,
+Result<BoardPictures> pictures_for(const CalibrateCameraCommand& command,
+                                   const StationConfig& config, const std::string& id,
                                    const CommonOptions& common, const Progress& progress) {
-  if (!command.images.empty()) {
-    taken = SystemClock().utc_now();
-    return read_pictures(command.images, config.board, progress);
-  }
-  // Only the camera in question is opened, without the calibration that is to be replaced.
-  std::erase_if(config.cameras, [&](const CameraConfig& camera) { return camera.id != id; });
-  config.calibration_folder.clear();
-  auto station = open_station(config, RoomSetting::board_in_hand, common.seed, common.threads);
-  if (!station) return forward(station);
-  taken = station->clock->utc_now();
-  return take_pictures(config, *station, station->cameras.front(), progress);
+  if (!command.images.empty()) return read_pictures(command.images, config.board, progress);
+  OperatorPrompts prompts;
+  prompts.tell = [](std::string_view words) { fmt::print(stderr, "\n{}\n", words); };
+  return photograph_board(config, id, prompts, common.seed, common.threads, progress);
 }
 
 CommandReport camera_report(const CameraCalibrationReport& report,
@@ -237,15 +186,11 @@ Result<CommandReport> run(const CalibrateCameraCommand& command, const CommonOpt
   if (!config) return forward(config);
   const auto id = chosen_camera(*config, command.camera);
   if (!id) return forward(id);
-  UtcTime taken;
-  const auto pictures = pictures_for(command, *config, *id, taken, common, progress.part(0.0, 0.9));
+  const auto pictures = pictures_for(command, *config, *id, common, progress.part(0.0, 0.9));
   if (!pictures) return forward(pictures);
   progress.report(0.9, "fitting the lens");
-  auto report = calibrate_camera(pictures->views, config->board, pictures->width, pictures->height);
+  const auto report = calibrate_from(*pictures, config->board, *id);
   if (!report) return forward(report);
-  report->calibration.camera = *id;
-  report->calibration.device = pictures->device;
-  report->calibration.created = to_iso8601(taken);
   const auto file = command.out.empty() ? camera_calibration_file(*config, *id) : command.out;
   if (const auto ready = prepare_folder(file); !ready) return forward(ready);
   if (const auto written = write_camera_calibration(report->calibration, file); !written) {

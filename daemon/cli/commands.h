@@ -1,12 +1,15 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "core/progress.h"
 #include "core/result.h"
 #include "daemon/cli/terminal.h"
 #include "reconstruction/distance/comparison.h"
+#include "reconstruction/registration/skull_registration.h"
 #include "reconstruction/volume/ct_surfaces.h"
 #include "reconstruction/volume/volume_options.h"
 
@@ -54,6 +57,16 @@ struct BoardCommand {
 };
 Result<CommandReport> run(const BoardCommand&, const CommonOptions&, const Progress&);
 
+/// Photographs to a metric surface (docs/poses_and_masks.md, docs/photogrammetry.md).
+struct ReconstructCommand {
+  std::filesystem::path session;
+  std::filesystem::path out;               ///< a folder that does not exist yet, or is empty
+  std::string poses = "auto";              ///< auto, board, given, sfm
+  std::string quality = "standard";        ///< draft, standard, fine
+  std::optional<double> camera_radius_mm;  ///< of the first camera from the table's axis
+};
+Result<CommandReport> run(const ReconstructCommand&, const CommonOptions&, const Progress&);
+
 /// Is a session readable, and are all its images intact?
 struct SessionCheckCommand {
   std::filesystem::path session;
@@ -87,8 +100,84 @@ struct PhantomCommand {
   int count = 1;
   std::filesystem::path out;
   double edge_mm = 1.5;
+  double mandible_opening_deg = 0.0;
+  bool ct = false;                  ///< write the CT volume, too
+  bool dicom = false;               ///< as a DICOM series instead of NIfTI
+  std::vector<double> spacing_mm;   ///< of its voxels, three; empty: 0.5, 0.5, 1
+  std::vector<std::string> flaws;   ///< words of add_flaw
+  bool specimen = false;            ///< write the stained bone as a specimen for the station
+  std::vector<std::string> damage;  ///< words of add_damage
 };
 Result<CommandReport> run(const PhantomCommand&, const CommonOptions&, const Progress&);
+
+/// Makes the templates of skull and head from the canonical phantom.
+struct TemplateBuildCommand {
+  std::filesystem::path out;
+  std::filesystem::path pictures;  ///< folder for both surfaces, coloured by region; empty: none
+  double skull_edge_mm = 1.7;
+  double head_edge_mm = 3.5;
+};
+Result<CommandReport> run(const TemplateBuildCommand&, const CommonOptions&, const Progress&);
+
+/// Deforms the template skull onto a surface: skull_fitted.ply and fit.json in `out`.
+struct FitSkullCommand {
+  std::filesystem::path mesh;
+  std::filesystem::path templates;
+  std::filesystem::path out;
+  SkullRegularizer regularizer = SkullRegularizer::smooth;
+  bool unit_unknown = false;
+};
+Result<CommandReport> run(const FitSkullCommand&, const CommonOptions&, const Progress&);
+
+/// Deforms the template head onto a surface: head_fitted.ply and fit.json in `out`.
+struct FitHeadCommand {
+  std::filesystem::path mesh;
+  std::filesystem::path templates;
+  std::filesystem::path out;
+  bool unit_unknown = false;
+};
+Result<CommandReport> run(const FitHeadCommand&, const CommonOptions&, const Progress&);
+
+/// Fits the templates to every subject folder and makes a model file of them.
+struct ModelBuildCommand {
+  std::filesystem::path subjects;
+  std::filesystem::path templates;
+  std::filesystem::path out;
+  std::filesystem::path fits;  ///< keeps finished fits between runs
+  std::string card;            ///< what the subjects are, in plain words
+  bool allow_failures = false;
+  int skull_modes = 60;
+  int head_modes = 60;
+};
+Result<CommandReport> run(const ModelBuildCommand&, const CommonOptions&, const Progress&);
+
+/// Leaves one subject out at a time: face error, calibration; compactness, generalisation,
+/// specificity.
+struct ModelEvaluateCommand {
+  std::filesystem::path subjects;
+  std::filesystem::path templates;
+  std::filesystem::path fits;
+  bool allow_failures = false;
+};
+Result<CommandReport> run(const ModelEvaluateCommand&, const CommonOptions&, const Progress&);
+
+struct ModelInfoCommand {
+  std::filesystem::path model;
+};
+Result<CommandReport> run(const ModelInfoCommand&, const CommonOptions&, const Progress&);
+
+/// From bone to face: a case folder with the face, its variants, uncertainty and report.
+struct ApproximateCommand {
+  std::filesystem::path skull;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::optional<std::string> sex;  ///< "male" or "female"
+  std::optional<double> age_years;
+  std::optional<double> body_mass_index;
+  bool mean_tissue = false;  ///< the paper's way: the population's mean depths
+  bool unit_unknown = false;
+};
+Result<CommandReport> run(const ApproximateCommand&, const CommonOptions&, const Progress&);
 
 /// Checks devices, space and calibration, and says what to mend.
 struct DoctorCommand {

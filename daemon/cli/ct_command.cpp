@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/staged_folder.h"
 #include "daemon/cli/commands.h"
 #include "daemon/subject/subject_folder.h"
 #include "daemon/subject/subject_json.h"
@@ -38,7 +39,7 @@ Result<CommandReport> run(const CtImportCommand& command, const CommonOptions& c
   CtSurfaceOptions options = command.surfaces;
   options.threads = common.threads;
   if (const auto valid = options.validate(); !valid) return forward(valid);
-  if (const auto free = check_subject_folder(command.out); !free) return forward(free);
+  if (const auto free = check_new_folder(command.out); !free) return forward(free);
 
   auto volume = read_volume(command.input, command.read, progress.part(0.0, 0.25));
   if (!volume) return forward(volume);

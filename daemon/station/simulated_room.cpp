@@ -136,8 +136,9 @@ Result<std::unique_ptr<Camera>> SimulatedRoom::open_camera(const CameraConfig& c
   options.serial = "SIM-" + camera.id;
   options.optics = optics_of(camera);
   options.render.samples = config_.simulation.render_samples;
-  options.render.samples_where_uneven =
-      std::max(options.render.samples_where_uneven, options.render.samples);
+  for (int* more : {&options.render.samples_where_uneven, &options.render.samples_at_outlines}) {
+    *more = std::max(*more, options.render.samples);
+  }
   options.render.seed = mix(mix(seed_, camera_seed), index_of(camera.id));
   options.render.threads = threads_;
   options.faults = camera.simulated.faults;

@@ -33,6 +33,10 @@ class SimulatedRoom {
 
   SimulatedStation& station() { return *station_; }
 
+  /// What the specimen is made of [mm]: the truth for whatever is made of its photographs. Empty on
+  /// a bare table.
+  const TriangleMesh& specimen() const { return specimen_; }
+
   /// A camera of the room; the room must outlive it.
   Result<std::unique_ptr<Camera>> open_camera(const CameraConfig& camera);
 

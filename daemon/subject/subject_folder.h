@@ -19,12 +19,9 @@ struct SubjectSource {
   std::string program_version;
 };
 
-/// Fails with `usage` where the folder is there already and holds something.
-Result<void> check_subject_folder(const std::filesystem::path& folder);
-
 /// Writes a subject's folder: skull.ply and skin.ply (patient frame, mm), quality.json,
 /// subject.json and report.html. The folder appears whole or not at all. The same bytes for any
-/// number of threads. Fails as check_subject_folder does, with the system's reason where it can't
+/// number of threads. Fails as check_new_folder does, with the system's reason where it can't
 /// be written, `cancelled` on request.
 Result<void> write_subject_folder(const CtSurfaces& surfaces, const SubjectSource& source,
                                   const std::filesystem::path& folder, int threads,

@@ -7,8 +7,8 @@
 
 #include "core/file.h"
 #include "reconstruction/io/ply.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/volume/dicom_writer.h"
-#include "reconstruction/volume/mesh_topology.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/volume/analytic_head.h"

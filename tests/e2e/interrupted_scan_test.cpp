@@ -69,12 +69,14 @@ TEST(InterruptedScan, SurvivesBeingKilledAtRandomMoments) {
     }
     scan.send(SIGKILL);
     scan.wait();
-    ++kills;
     const HashOfImage after = recorded_views(folder / "session");
+    kills += after.empty() ? 0 : 1;
     for (const auto& [image, hash] : before) {
       ASSERT_TRUE(after.contains(image)) << image << " was recorded and is lost, kill " << kills;
       EXPECT_EQ(after.at(image), hash) << image << " was recorded and has changed";
     }
+    // On a slow machine a scan needs longer until there is something to lose.
+    if (after.size() == before.size()) longest += longest / 2;
     resumed += before.empty() ? 0 : 1;
   }
   EXPECT_GT(resumed, kills_wanted / 4) << "too few kills hit a session under way";

@@ -1,0 +1,210 @@
+#include "daemon/case/case_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/session/image_file.h"
+#include "core/staged_folder.h"
+#include "daemon/case/case_report.h"
+#include "reconstruction/io/glb.h"
+#include "reconstruction/io/ply.h"
+
+namespace skullstation {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr double band_colors_mm = 8.0;
+
+Json json_of(const Similarity3& similarity) {
+  const Eigen::Matrix4d matrix = similarity.matrix();
+  Json rows = Json::array();
+  for (int r = 0; r < 4; ++r) {
+    rows.push_back({matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3)});
+  }
+  return rows;
+}
+
+Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+std::string case_json(const FaceModel& model, const CaseSkull& skull, const FaceEstimate& face,
+                      const CaseSource& source) {
+  Json landmarks = Json::array();
+  for (const LandmarkDepth& depth : landmark_depths(model, face)) {
+    landmarks.push_back({{"name", depth.name},
+                         {"depth_mm", depth.depth_mm},
+                         {"sd_mm", depth.sd_mm},
+                         {"model_mean_mm", depth.model_mean_mm},
+                         {"model_sd_mm", depth.model_sd_mm},
+                         {"subjects", depth.subjects}});
+  }
+  return Json{
+             {"format", "skullstation-case/1"},
+             {"input", {{"file", source.input}, {"sha256", source.input_sha256}}},
+             {"model",
+              {{"file", source.model},
+               {"sha256", source.model_sha256},
+               {"card", source.model_card},
+               {"subjects", model.joint.subjects}}},
+             {"program_version", source.program_version},
+             {"seed", source.seed},
+             {"facts",
+              {{"male", json_of(source.facts.male)},
+               {"age_years", json_of(source.facts.age_years)},
+               {"body_mass_index", json_of(source.facts.body_mass_index)}}},
+             {"anatomical_from_input", json_of(skull.anatomical_from_input)},
+             {"skull_fit",
+              {{"facial_mean_mm", skull.quality.facial.mean_mm},
+               {"facial_p95_mm", skull.quality.facial.p95_mm},
+               {"inverted_tetrahedra", skull.quality.inverted_tetrahedra},
+               {"observed_share", skull.quality.observed_share},
+               {"mandible_observed_share", skull.quality.mandible_observed_share},
+               {"strangeness_sd", skull.strangeness}}},
+             {"warnings", skull.warnings},
+             {"face", {{"mean_sd_mm", face.sd_mm.mean()}, {"mean_band80_mm", face.band_mm.mean()}}},
+             {"tissue", landmarks}}
+             .dump(2) +
+         "\n";
+}
+
+std::string tissue_csv(const FaceModel& model, const FaceEstimate& face) {
+  std::string text = "landmark,depth_mm,sd_mm,model_mean_mm,model_sd_mm,subjects,source\n";
+  for (const LandmarkDepth& depth : landmark_depths(model, face)) {
+    text +=
+        fmt::format("{},{:.2f},{:.2f},{:.2f},{:.2f},{},joint model\n", depth.name, depth.depth_mm,
+                    depth.sd_mm, depth.model_mean_mm, depth.model_sd_mm, depth.subjects);
+  }
+  return text;
+}
+
+std::string file_name(std::string name) {
+  std::ranges::replace(name, ' ', '_');
+  std::erase(name, ',');
+  return name;
+}
+
+TriangleMesh head_mesh(const FaceModel& model, const Points3& vertices) {
+  return surface_of(model.head_template, vertices);
+}
+
+Result<void> write_uncertainty(const TriangleMesh& head, const FaceEstimate& face,
+                               const fs::path& path) {
+  TriangleMesh mesh = head;
+  mesh.colors = scalar_colors(face.band_mm, 0.0, band_colors_mm);
+  Eigen::VectorXd from_bone(head.vertices.rows());
+  for (Eigen::Index v = 0; v < from_bone.size(); ++v) {
+    from_bone[v] = face.from_bone[static_cast<std::size_t>(v)] ? 1.0 : 0.0;
+  }
+  return write_ply(mesh, path,
+                   {{"sd_mm", face.sd_mm}, {"band80_mm", face.band_mm}, {"from_bone", from_bone}});
+}
+
+}  // namespace
+
+std::vector<FaceVariant> face_variants(const FaceEstimate& face) {
+  std::vector<const FaceVariation*> tissue;
+  for (const FaceVariation& variation : face.variations) {
+    if (variation.name.starts_with("tissue") && tissue.size() < 2) tissue.push_back(&variation);
+  }
+  std::vector<FaceVariant> variants;
+  for (const int second : {-2, 0, 2}) {
+    if (tissue.size() < 2 && second != 0) continue;
+    for (const int first : {-2, 0, 2}) {
+      if (tissue.empty() && first != 0) continue;
+      FaceVariant variant;
+      variant.name = "mean";
+      variant.head = face.head;
+      if (first != 0 || second != 0) variant.name.clear();
+      if (first != 0) {
+        variant.name = fmt::format("tissue 1 {:+d}", first);
+        variant.head += first * tissue[0]->per_sd_mm;
+      }
+      if (second != 0) {
+        variant.name += fmt::format("{}tissue 2 {:+d}", first != 0 ? ", " : "", second);
+        variant.head += second * tissue[1]->per_sd_mm;
+      }
+      variants.push_back(std::move(variant));
+    }
+  }
+  const auto weight = std::ranges::find(face.variations, "body mass index", &FaceVariation::name);
+  if (weight != face.variations.end()) {
+    variants.push_back({"leaner", face.head - 1.5 * weight->per_sd_mm});
+    variants.push_back({"fuller", face.head + 1.5 * weight->per_sd_mm});
+  }
+  return variants;
+}
+
+Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
+                               const FaceEstimate& face, const CaseSource& source,
+                               const fs::path& folder, const FacePictureOptions& picture_options,
+                               const Progress& progress) {
+  if (const auto free = check_new_folder(folder); !free) return free;
+  StagedFolder staged(folder);
+  if (const auto made = staged.make(); !made) return made;
+  if (const auto made = make_writable_folder(staged / "variants"); !made) return made;
+  const TriangleMesh bone =
+      surface_of(model.skull_template, skull.vertices.topRows(model.skull_template.boundary_count));
+  const TriangleMesh head = head_mesh(model, face.head);
+
+  progress.report(0.0, "drawing the face");
+  CasePictures pictures;
+  auto drawn = face_pictures(head, picture_options);
+  if (!drawn) return forward(drawn);
+  pictures.face = *std::move(drawn);
+  progress.report(0.2, "drawing the method");
+  drawn = method_pictures(bone, face.tissue_mm, face.spheres, head, picture_options);
+  if (!drawn) return forward(drawn);
+  pictures.method = *std::move(drawn);
+  progress.report(0.5, "drawing uncertainty and variants");
+  drawn = uncertainty_pictures(head, face, band_colors_mm, picture_options);
+  if (!drawn) return forward(drawn);
+  pictures.uncertainty = *std::move(drawn);
+  std::vector<std::pair<std::string, TriangleMesh>> variant_heads;
+  for (const FaceVariant& variant : face_variants(face)) {
+    const TriangleMesh mesh = head_mesh(model, variant.head);
+    if (const auto written =
+            write_glb(mesh, staged / "variants" / (file_name(variant.name) + ".glb"));
+        !written) {
+      return written;
+    }
+    variant_heads.emplace_back(variant.name, mesh);
+  }
+  drawn = variant_pictures(variant_heads, picture_options);
+  if (!drawn) return forward(drawn);
+  pictures.variants = *std::move(drawn);
+  if (progress.stop.stop_requested()) {
+    return fail(ErrorKind::cancelled, folder.string(), "was not written");
+  }
+
+  progress.report(0.9, "writing the case");
+  std::vector<MorphTarget> morphs;
+  for (const FaceVariation& variation : face.variations) {
+    morphs.push_back({variation.name, variation.per_sd_mm});
+  }
+  for (const auto& written :
+       {write_ply(bone, staged / "skull_fitted.ply"), write_ply(head, staged / "head.ply"),
+        write_ply(face.spheres, staged / "spheres.ply"),
+        write_glb(head, staged / "head.glb", morphs),
+        write_uncertainty(head, face, staged / "uncertainty.ply"),
+        write_file_durably(staged / "tissue.csv", tissue_csv(model, face)),
+        write_file_durably(staged / "case.json", case_json(model, skull, face, source)),
+        write_file_durably(staged / "report.html",
+                           case_report(model, skull, face, source, pictures))}) {
+    if (!written) return written;
+  }
+  for (const auto& [name, picture] : pictures.face) {
+    const fs::path file = staged / ("preview_" + file_name(name) + ".png");
+    if (const auto written = write_file_durably(file, encode_png(picture)); !written) {
+      return written;
+    }
+  }
+  return staged.put_in_place();
+}
+
+}  // namespace skullstation

@@ -1,0 +1,128 @@
+#include "daemon/case/case_report.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "daemon/subject/html_report.h"
+
+namespace skullstation {
+
+namespace {
+
+using Eigen::Index;
+
+std::string facts_in_words(const PersonFacts& facts) {
+  std::string words;
+  const auto add = [&](const std::string& word) { words += (words.empty() ? "" : ", ") + word; };
+  if (facts.male) add(*facts.male > 0.5 ? "male" : "female");
+  if (facts.age_years) add(fmt::format("{:.0f} years", *facts.age_years));
+  if (facts.body_mass_index) add(fmt::format("body mass index {:.1f}", *facts.body_mass_index));
+  return words.empty() ? "nothing" : words;
+}
+
+double mean_band_mm(const FaceEstimate& face) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (Index v = 0; v < face.band_mm.size(); ++v) {
+    if (!face.from_bone[static_cast<std::size_t>(v)]) continue;
+    sum += face.band_mm[v];
+    count += 1.0;
+  }
+  return sum / std::max(1.0, count);
+}
+
+}  // namespace
+
+std::vector<LandmarkDepth> landmark_depths(const FaceModel& model, const FaceEstimate& face) {
+  std::vector<LandmarkDepth> depths;
+  for (const TemplateLandmark& landmark : model.skull_template.landmarks) {
+    LandmarkDepth row;
+    row.name = landmark.name;
+    const auto at = [&](const Eigen::VectorXd& values) {
+      double sum = 0.0;
+      for (int k = 0; k < 3; ++k) {
+        if (landmark.place.weights[k] > 0.0) {
+          sum += landmark.place.weights[k] * values[landmark.place.corners[k]];
+        }
+      }
+      return sum;
+    };
+    row.depth_mm = at(face.tissue_mm);
+    row.sd_mm = at(face.tissue_sd_mm);
+    row.model_mean_mm = at(model.tissue.mean_mm);
+    row.model_sd_mm = at(model.tissue.sd_mm);
+    row.subjects = model.tissue.count[landmark.place.corners[0]];
+    if (!std::isnan(row.depth_mm)) depths.push_back(row);
+  }
+  return depths;
+}
+
+std::string case_report(const FaceModel& model, const CaseSkull& skull, const FaceEstimate& face,
+                        const CaseSource& source, const CasePictures& pictures) {
+  HtmlReport report("Facial approximation");
+  report.add_paragraph(
+      "A facial approximation is an investigative aid, not an identification. It shows one face "
+      "out "
+      "of many that the skull allows. Hair, eyes, skin colour and expression are not known and are "
+      "not shown; nose, lips, eyes and ears follow from bone only in part.");
+  for (const std::string& warning : skull.warnings) report.add_warning("warning", warning);
+  report.add_warning("model", source.model_card);
+  report.add_pictures(pictures.face);
+
+  report.add_heading("How far it may be off");
+  report.add_paragraph(fmt::format(
+      "Over bone, eight faces in ten of people with such a skull lie within {:.1f} mm of this one, "
+      "on average over the face. Colours: half width of that band from 0 (dark) to 8 mm (yellow). "
+      "Grey: not determined by the bone below; the model's guess.",
+      mean_band_mm(face)));
+  report.add_pictures(pictures.uncertainty);
+
+  report.add_heading("Faces that are as plausible");
+  report.add_paragraph(
+      "Two standard deviations along the ways in which the soft tissue of the model's subjects "
+      "differs most, and leaner and fuller where the body mass index is not known. Show them "
+      "together: whoever knew the person may recognise one and not another.");
+  report.add_pictures(pictures.variants);
+
+  report.add_heading("How it was made");
+  report.add_pictures(pictures.method);
+  report.add_table({
+      {"known besides the skull", facts_in_words(source.facts)},
+      {"skull's face to the fitted template",
+       fmt::format("mean {:.2f} mm, 95 % within {:.2f} mm", skull.quality.facial.mean_mm,
+                   skull.quality.facial.p95_mm)},
+      {"of the skull's outside was observed",
+       fmt::format("{:.0f} %, of the mandible {:.0f} %", 100.0 * skull.quality.observed_share,
+                   100.0 * skull.quality.mandible_observed_share)},
+      {"distance from the model's skulls",
+       fmt::format("{:.2f} standard deviations (about 1 is usual)", skull.strangeness)},
+      {"model",
+       fmt::format("{} subjects, {} skull, {} tissue and {} head modes", model.joint.subjects,
+                   model.skull.mode_count(), model.tissue.mode_count(), model.head.mode_count())},
+  });
+
+  report.add_heading("Soft tissue at the landmarks");
+  std::vector<std::pair<std::string, std::string>> rows;
+  for (const LandmarkDepth& depth : landmark_depths(model, face)) {
+    rows.emplace_back(
+        depth.name,
+        fmt::format("{:.1f} +- {:.1f} mm (model: {:.1f} +- {:.1f} mm, n = {})", depth.depth_mm,
+                    depth.sd_mm, depth.model_mean_mm, depth.model_sd_mm, depth.subjects));
+  }
+  report.add_table(rows);
+
+  report.add_heading("To make it again");
+  report.add_table({{"skull", source.input},
+                    {"its SHA-256", source.input_sha256},
+                    {"model", source.model},
+                    {"its SHA-256", source.model_sha256},
+                    {"program", "skullstation " + source.program_version},
+                    {"seed", std::to_string(source.seed)},
+                    {"method",
+                     "Gietzen et al. 2019 (statistical skull model, dense soft tissue thickness, "
+                     "statistical head model), with the joint model of skull, tissue and head"}});
+  return report.page();
+}
+
+}  // namespace skullstation

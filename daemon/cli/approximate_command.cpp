@@ -1,0 +1,77 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/staged_folder.h"
+#include "daemon/case/case_folder.h"
+#include "daemon/cli/commands.h"
+#include "reconstruction/io/mesh_file.h"
+#include "reconstruction/statistics/model_file.h"
+
+namespace skullstation {
+
+Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions& common,
+                          const Progress& progress) {
+  if (const auto free = check_new_folder(command.out); !free) return forward(free);
+  FaceOptions options;
+  options.threads = common.threads;
+  options.facts.age_years = command.age_years;
+  options.facts.body_mass_index = command.body_mass_index;
+  if (command.sex) options.facts.male = *command.sex == "male" ? 1.0 : 0.0;
+  if (command.mean_tissue) options.tissue = TissueChoice::population;
+  if (const auto sound = options.validate(); !sound) return forward(sound);
+
+  CaseSource source;
+  auto input_bytes = read_file(command.skull);
+  if (!input_bytes) return forward(input_bytes);
+  source.input = command.skull.filename().string();
+  source.input_sha256 = sha256_hex(*input_bytes);
+  const auto input = read_mesh(command.skull);
+  if (!input) return forward(input);
+  auto model_bytes = read_file(command.model);
+  if (!model_bytes) return forward(model_bytes);
+  source.model = command.model.filename().string();
+  source.model_sha256 = sha256_hex(*model_bytes);
+  const auto model = decode_model(*std::move(model_bytes), command.model.string());
+  if (!model) return forward(model);
+  const auto provenance = nlohmann::json::parse(model->provenance, nullptr, false);
+  if (provenance.is_object()) source.model_card = provenance.value("card", std::string());
+  source.program_version = SKULLSTATION_VERSION;
+  source.facts = options.facts;
+  source.seed = common.seed;
+
+  SkullRegistrationOptions fit_options;
+  fit_options.unit_unknown = command.unit_unknown;
+  fit_options.seed = common.seed;
+  fit_options.threads = common.threads;
+  const auto skull = fit_case_skull(*model, *input, fit_options, progress.part(0.05, 0.6));
+  if (!skull) return forward(skull);
+  const auto face = estimate_face(*model, *skull, options, progress.part(0.6, 0.75));
+  if (!face) return forward(face);
+  if (const auto written = write_case_folder(*model, *skull, *face, source, command.out,
+                                             {.threads = common.threads}, progress.part(0.75, 1.0));
+      !written) {
+    return forward(written);
+  }
+
+  CommandReport report;
+  for (const std::string& warning : skull->warnings) report.text += "warning: " + warning + "\n";
+  report.text += fmt::format(
+      "{}\n  skull to template: mean {:.2f} mm, P95 {:.2f} mm; {:.0f} % observed\n"
+      "  face: +- {:.1f} mm (80 % band, mean over the head)\n  look at it: {}\n",
+      command.out.string(), skull->quality.facial.mean_mm, skull->quality.facial.p95_mm,
+      100.0 * skull->quality.observed_share, face->band_mm.mean(),
+      (command.out / "report.html").string());
+  report.json = nlohmann::ordered_json{{"case", command.out.string()},
+                                       {"facial_mean_mm", skull->quality.facial.mean_mm},
+                                       {"facial_p95_mm", skull->quality.facial.p95_mm},
+                                       {"observed_share", skull->quality.observed_share},
+                                       {"strangeness_sd", skull->strangeness},
+                                       {"mean_band80_mm", face->band_mm.mean()},
+                                       {"warnings", skull->warnings}}
+                    .dump(2);
+  return report;
+}
+
+}  // namespace skullstation

@@ -1,0 +1,265 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "daemon/cli/commands.h"
+#include "daemon/model/fitted_subjects.h"
+#include "reconstruction/statistics/build_face_model.h"
+#include "reconstruction/statistics/model_file.h"
+#include "reconstruction/statistics/model_quality.h"
+#include "reconstruction/templates/template_file.h"
+
+namespace skullstation {
+
+namespace {
+
+using Eigen::Index;
+using Json = nlohmann::ordered_json;
+
+struct Population {
+  std::vector<ModelSubject> subjects;
+  Json sources = Json::array();   ///< name and hash of each that takes part
+  Json failures = Json::array();  ///< name and reason of each that does not
+  std::string notes;              ///< the same for people
+};
+
+Result<Population> population_of(const std::vector<SubjectFit>& fits, bool allow_failures) {
+  Population population;
+  for (const SubjectFit& fit : fits) {
+    if (fit.failure.empty()) {
+      population.subjects.push_back(fit.subject);
+      population.sources.push_back(
+          {{"name", fit.subject.name}, {"surfaces_sha256", fit.surfaces_sha256}});
+    } else {
+      population.failures.push_back({{"name", fit.subject.name}, {"reason", fit.failure}});
+      population.notes += fmt::format("left out: {}: {}\n", fit.subject.name, fit.failure);
+    }
+  }
+  if (!population.failures.empty() && !allow_failures) {
+    return fail(ErrorKind::no_result, "model build",
+                fmt::format("{} of {} subjects can't be fitted:\n{}", population.failures.size(),
+                            fits.size(), population.notes),
+                "mend them, take them away, or say --allow-failures");
+  }
+  return population;
+}
+
+/// Mean over the vertices of the wanted regions, of absolute values.
+double mean_abs(const HeadTemplate& head, const Eigen::VectorXd& errors, bool face_only) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (Index v = 0; v < errors.size(); ++v) {
+    const HeadRegion region = head.region[static_cast<std::size_t>(v)];
+    const bool face = region == HeadRegion::face || region == HeadRegion::nose ||
+                      region == HeadRegion::lips || region == HeadRegion::eyes;
+    if (face_only && !face) continue;
+    sum += std::abs(errors[v]);
+    count += 1.0;
+  }
+  return sum / std::max(1.0, count);
+}
+
+/// Two-sided p of Wilcoxon's signed rank test (1945), normal approximation.
+double wilcoxon_p(std::vector<double> differences) {
+  std::erase(differences, 0.0);
+  std::ranges::sort(differences, {}, [](double d) { return std::abs(d); });
+  const auto n = static_cast<double>(differences.size());
+  double positive = 0.0;
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    if (differences[i] > 0.0) positive += static_cast<double>(i) + 1.0;
+  }
+  const double z =
+      (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
+  return std::erfc(std::abs(z) / std::sqrt(2.0));
+}
+
+struct Prediction {
+  const char* name;
+  double mean_mm = 0.0;
+  double coverage = 0.0;  ///< of the 80 % band
+};
+
+}  // namespace
+
+Result<CommandReport> run(const ModelBuildCommand& command, const CommonOptions& common,
+                          const Progress& progress) {
+  const auto templates = read_templates(command.templates);
+  if (!templates) return forward(templates);
+  const auto fits =
+      fit_subjects(command.subjects, templates->skull, templates->head,
+                   {command.fits, common.seed, common.threads}, progress.part(0.0, 0.9));
+  if (!fits) return forward(fits);
+  auto population = population_of(*fits, command.allow_failures);
+  if (!population) return forward(population);
+  FaceModelOptions options;
+  options.skull.max_modes = command.skull_modes;
+  options.head.max_modes = command.head_modes;
+  const Json provenance = {{"format", "skullstation-model/1"},
+                           {"program_version", SKULLSTATION_VERSION},
+                           {"seed", common.seed},
+                           {"card", command.card},
+                           {"subjects", population->sources},
+                           {"left_out", population->failures}};
+  const auto model =
+      build_face_model(templates->skull, templates->head, std::move(population->subjects), options,
+                       provenance.dump(), progress.part(0.9, 1.0));
+  if (!model) return forward(model);
+  const auto bytes = encode_model(*model);
+  if (!bytes) return forward(bytes);
+  if (const auto written = write_file_durably(command.out, *bytes); !written) {
+    return forward(written);
+  }
+  CommandReport report;
+  report.text =
+      population->notes +
+      fmt::format("{}: {} subjects, {} skull modes, {} head modes, {} tissue modes, {:.1f} MB\n",
+                  command.out.string(), model->joint.subjects, model->skull.mode_count(),
+                  model->head.mode_count(), model->tissue.mode_count(),
+                  static_cast<double>(bytes->size()) / 1e6);
+  report.json = Json{{"model", command.out.string()},
+                     {"sha256", sha256_hex(*bytes)},
+                     {"subjects", model->joint.subjects},
+                     {"left_out", population->failures},
+                     {"skull_modes", model->skull.mode_count()},
+                     {"head_modes", model->head.mode_count()},
+                     {"tissue_modes", model->tissue.mode_count()}}
+                    .dump(2);
+  return report;
+}
+
+Result<CommandReport> run(const ModelInfoCommand& command, const CommonOptions&, const Progress&) {
+  auto bytes = read_file(command.model);
+  if (!bytes) return forward(bytes);
+  const std::string hash = sha256_hex(*bytes);
+  const auto model = decode_model(*std::move(bytes), command.model.string());
+  if (!model) return forward(model);
+  const auto provenance = Json::parse(model->provenance, nullptr, false);
+  const std::string card =
+      provenance.is_object() ? provenance.value("card", std::string()) : std::string();
+  CommandReport report;
+  report.text = fmt::format(
+      "{}\nsha256 {}\n{} subjects\nskull: {} vertices, {} modes\nhead: {} vertices, {} modes\n"
+      "tissue: {} modes\njoint model: {} variables, shrinkage {:.3f}\n",
+      card, hash, model->joint.subjects, model->skull.vertex_count(), model->skull.mode_count(),
+      model->head.vertex_count(), model->head.mode_count(), model->tissue.mode_count(),
+      model->joint.names.size(), model->joint.shrinkage);
+  Json bands = Json::array();
+  for (const BandFactor& band : model->bands) {
+    bands.push_back({{"region", band.region}, {"level", band.level}, {"factor", band.factor}});
+    report.text +=
+        fmt::format("{:.0f} % band, {}: {:.2f} SD\n", 100.0 * band.level, band.region, band.factor);
+  }
+  report.json = Json{
+      {"model", command.model.string()},
+      {"sha256", hash},
+      {"subjects", model->joint.subjects},
+      {"skull_modes", model->skull.mode_count()},
+      {"head_modes", model->head.mode_count()},
+      {"tissue_modes", model->tissue.mode_count()},
+      {"bands", bands},
+      {"provenance",
+       provenance}}.dump(2);
+  return report;
+}
+
+Result<CommandReport> run(const ModelEvaluateCommand& command, const CommonOptions& common,
+                          const Progress& progress) {
+  const auto templates = read_templates(command.templates);
+  if (!templates) return forward(templates);
+  const auto fits =
+      fit_subjects(command.subjects, templates->skull, templates->head,
+                   {command.fits, common.seed, common.threads}, progress.part(0.0, 0.6));
+  if (!fits) return forward(fits);
+  auto population = population_of(*fits, command.allow_failures);
+  if (!population) return forward(population);
+  auto subjects =
+      aligned_population(templates->skull, templates->head, std::move(population->subjects));
+  if (!subjects) return forward(subjects);
+  complete_skulls(templates->skull, *subjects);
+  const auto left =
+      leave_one_out(templates->skull, templates->head, *subjects, {}, progress.part(0.6, 0.8));
+  if (!left) return forward(left);
+
+  std::vector<Points3> skulls;
+  std::vector<Points3> heads;
+  for (const ModelSubject& subject : *subjects) {
+    skulls.push_back(subject.skull);
+    heads.push_back(subject.head);
+  }
+  ModelQualityOptions quality_options;
+  quality_options.threads = common.threads;
+  quality_options.seed = common.seed;
+  quality_options.random_members = 200;
+  quality_options.max_modes = 20;
+  progress.report(0.8, "model quality");
+  const auto head_quality = model_quality(
+      heads, vertex_areas({templates->head.vertices, templates->head.triangles, {}, {}}),
+      quality_options);
+  if (!head_quality) return forward(head_quality);
+  const auto skull_quality =
+      model_quality(skulls, skull_weights(templates->skull), quality_options);
+  if (!skull_quality) return forward(skull_quality);
+
+  Prediction predictions[] = {{"mean head"}, {"given the skull"}, {"given skull, sex, age, BMI"}};
+  std::vector<double> gains;
+  const auto count = static_cast<double>(left->size());
+  for (const LeftOut& subject : *left) {
+    const Eigen::VectorXd* errors[] = {&subject.mean_error_mm, &subject.skull_error_mm,
+                                       &subject.full_error_mm};
+    const Eigen::VectorXd* sds[] = {nullptr, &subject.skull_sd_mm, &subject.full_sd_mm};
+    for (int i = 0; i < 3; ++i) {
+      predictions[i].mean_mm += mean_abs(templates->head, *errors[i], true) / count;
+      if (sds[i] == nullptr) continue;
+      const Eigen::ArrayXd ratio = errors[i]->cwiseAbs().cwiseQuotient(*sds[i]).array();
+      predictions[i].coverage +=
+          static_cast<double>((ratio < 1.2816).count()) / static_cast<double>(ratio.size()) / count;
+    }
+    gains.push_back(mean_abs(templates->head, subject.mean_error_mm, true) -
+                    mean_abs(templates->head, subject.skull_error_mm, true));
+  }
+  const double p = wilcoxon_p(gains);
+  CommandReport report;
+  report.text =
+      fmt::format("{} subjects, each foretold by the others\n\n{:<30}{:>16}{:>14}\n", left->size(),
+                  "face error, along the normal", "mean [mm]", "in 80 % band");
+  Json errors = Json::array();
+  for (const Prediction& prediction : predictions) {
+    report.text += fmt::format("{:<30}{:>16.3f}{:>13.1f} %\n", prediction.name, prediction.mean_mm,
+                               100.0 * prediction.coverage);
+    errors.push_back({{"prediction", prediction.name},
+                      {"mean_mm", prediction.mean_mm},
+                      {"in_gaussian_80_band", prediction.coverage}});
+  }
+  report.text += fmt::format(
+      "skull against mean head: Wilcoxon p = {:.2g}\n\n{:>6}{:>14}{:>16}"
+      "{:>14}{:>14}{:>16}{:>14}\n",
+      p, "modes", "skull compact", "generalis. [mm]", "specif. [mm]", "head compact",
+      "generalis. [mm]", "specif. [mm]");
+  for (std::size_t m = 0;
+       m < std::min(head_quality->compactness.size(), skull_quality->compactness.size()); ++m) {
+    report.text +=
+        fmt::format("{:>6}{:>13.1f}%{:>16.3f}{:>14.3f}{:>13.1f}%{:>16.3f}{:>14.3f}\n", m + 1,
+                    100.0 * skull_quality->compactness[m], skull_quality->generalisation_mm[m],
+                    skull_quality->specificity_mm[m], 100.0 * head_quality->compactness[m],
+                    head_quality->generalisation_mm[m], head_quality->specificity_mm[m]);
+  }
+  const auto json_of = [](const ModelQuality& quality) {
+    return Json{{"compactness", quality.compactness},
+                {"generalisation_mm", quality.generalisation_mm},
+                {"generalisation_error_mm", quality.generalisation_error_mm},
+                {"specificity_mm", quality.specificity_mm}};
+  };
+  report.json = Json{{"subjects", left->size()},
+                     {"face_error", errors},
+                     {"wilcoxon_p", p},
+                     {"skull", json_of(*skull_quality)},
+                     {"head", json_of(*head_quality)},
+                     {"left_out", population->failures}}
+                    .dump(2);
+  return report;
+}
+
+}  // namespace skullstation

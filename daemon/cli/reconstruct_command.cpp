@@ -1,0 +1,172 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/session/image_file.h"
+#include "daemon/cli/commands.h"
+#include "reconstruction/io/glb.h"
+#include "reconstruction/io/ply.h"
+#include "reconstruction/photogrammetry/quality_report.h"
+#include "reconstruction/rendering/picture_sheet.h"
+
+namespace skullstation {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+ReconstructionOptions options_of(const ReconstructCommand& command, const CommonOptions& common) {
+  ReconstructionOptions options;
+  options.threads = common.threads;
+  options.seed = common.seed;
+  if (command.poses == "board") options.poses.method = PoseMethod::board;
+  if (command.poses == "given") options.poses.method = PoseMethod::given;
+  if (command.poses == "sfm") options.poses.method = PoseMethod::motion;
+  options.poses.motion.camera_radius_mm = command.camera_radius_mm;
+  if (command.quality == "draft") options.quality = ReconstructionQuality::draft;
+  if (command.quality == "fine") options.quality = ReconstructionQuality::fine;
+  return options;
+}
+
+Result<std::vector<Image8>> eight_sides(const TriangleMesh& mesh, int size_px, int threads) {
+  const PicturedMesh pictured{&mesh};
+  PictureOptions options;
+  options.width = options.height = size_px;
+  options.samples = 4;
+  options.threads = threads;
+  return render_sides({&pictured, 1}, head_sides(), options);
+}
+
+Result<void> write_previews(const TriangleMesh& mesh, const fs::path& folder, int threads) {
+  constexpr int size_px = 600;
+  const auto pictures = eight_sides(mesh, size_px, threads);
+  if (!pictures) return forward(pictures);
+  for (std::size_t i = 0; i < pictures->size(); ++i) {
+    std::string name = head_sides()[i].name;
+    std::ranges::replace(name, ' ', '_');
+    const auto written = write_file_durably(folder / fmt::format("preview_{}.png", name),
+                                            encode_png((*pictures)[i]));
+    if (!written) return written;
+  }
+  return {};
+}
+
+/// With its texture where there is one; without, with its vertices' colours.
+Result<void> write_model(const ReconstructedSurface& surface, const fs::path& path) {
+  constexpr int texture_quality = 92;
+  if (!surface.textured) return write_glb(surface.mesh, path);
+  const TexturedSurface& textured = *surface.textured;
+  return write_glb(textured.mesh,
+                   {textured.coordinates, encode_jpeg(textured.atlas, texture_quality)}, path);
+}
+
+/// All sides of a coloured mesh in one picture.
+Result<void> write_sheet(const TriangleMesh& mesh, const fs::path& file, int threads) {
+  constexpr int size_px = 320;
+  const auto pictures = eight_sides(mesh, size_px, threads);
+  if (!pictures) return forward(pictures);
+  return write_file_durably(file, encode_png(picture_sheet(*pictures, 4)));
+}
+
+Result<void> write_parts(const SessionReconstruction& reconstruction, const fs::path& folder,
+                         int threads) {
+  const TriangleMesh& mesh = reconstruction.surface.mesh;
+  const Coverage& coverage = reconstruction.surface.coverage;
+  const TriangleMesh by_coverage = colored_by_coverage(mesh, coverage.views);
+  const auto cameras = format_session(reconstruction.cameras);
+  if (!cameras) return forward(cameras);
+  if (const auto made = make_writable_folder(folder); !made) return made;
+  for (const auto& written :
+       {write_ply(mesh, folder / "skull.ply"),
+        write_model(reconstruction.surface, folder / "skull.glb"),
+        write_ply(by_coverage, folder / "coverage.ply"),
+        write_file_durably(folder / "cameras.json", *cameras),
+        write_file_durably(folder / "quality.json", quality_json(reconstruction)),
+        write_previews(mesh, folder, threads),
+        write_sheet(by_coverage, folder / "quality_coverage.png", threads),
+        write_sheet(colored_by_accuracy(mesh, coverage.accuracy_mm),
+                    folder / "quality_accuracy.png", threads)}) {
+    if (!written) return written;
+  }
+  return {};
+}
+
+/// All files under a name of their own first: the folder appears whole or not at all.
+Result<void> write_reconstruction(const SessionReconstruction& reconstruction, const fs::path& out,
+                                  int threads) {
+  fs::path partial = out.lexically_normal();
+  if (!partial.has_filename()) partial = partial.parent_path();
+  partial += ".partial";
+  std::error_code error;
+  fs::remove_all(partial, error);
+  if (const auto written = write_parts(reconstruction, partial, threads); !written) {
+    fs::remove_all(partial, error);
+    return written;
+  }
+  fs::rename(partial, out.lexically_normal(), error);
+  if (error) {
+    const std::string reason = error.message();
+    fs::remove_all(partial, error);
+    return fail(ErrorKind::bad_input, out.string(), "can't be written: " + reason);
+  }
+  return {};
+}
+
+CommandReport report_of(const SessionReconstruction& reconstruction, const fs::path& out) {
+  const QualityFigures figures = quality_figures(reconstruction);
+  const PoseResult& poses = reconstruction.poses;
+  CommandReport report;
+  report.text = fmt::format(
+      "{}: {} triangles from {} of {} views, estimated accuracy {:.2f} mm, scale from {}",
+      (out / "skull.ply").string(), reconstruction.surface.mesh.triangles.rows(),
+      figures.views_used, figures.views, figures.accuracy_mm, to_string(poses.scale));
+  const std::vector<std::string> verdicts = quality_verdicts(reconstruction, figures);
+  for (const std::string& verdict : verdicts) report.text += "\n" + verdict;
+  report.json = nlohmann::ordered_json{
+      {"reconstruction", out.string()},
+      {"views", figures.views},
+      {"views_used", figures.views_used},
+      {"triangles", reconstruction.surface.mesh.triangles.rows()},
+      {"area_cm2", figures.area_cm2},
+      {"reprojection_rms_px", poses.rms_px},
+      {"accuracy_mm", figures.accuracy_mm},
+      {"scale_source", to_string(poses.scale)},
+      {"scale_error_percent", poses.scale_error_percent},
+      {"verdicts",
+       verdicts}}.dump(2);
+  return report;
+}
+
+}  // namespace
+
+Result<CommandReport> run(const ReconstructCommand& command, const CommonOptions& common,
+                          const Progress& progress) {
+  std::error_code ignored;
+  if (fs::exists(command.out, ignored) && !fs::is_empty(command.out, ignored)) {
+    return fail(ErrorKind::usage, command.out.string(), "exists and is not empty",
+                "give a folder that does not exist yet");
+  }
+  const auto session = read_session(command.session);
+  if (!session) return forward(session);
+  if (session->views.empty()) {
+    return fail(ErrorKind::bad_input, command.session.string(), "lists no views");
+  }
+  const auto photographs =
+      read_photographs(*session, command.session, common.threads, progress.part(0.0, 0.05));
+  if (!photographs) return forward(photographs);
+  const auto masks = read_given_masks(*session, command.session);
+  if (!masks) return forward(masks);
+  const auto reconstruction = reconstruct_session(
+      *session, *photographs, *masks, options_of(command, common), progress.part(0.05, 0.95));
+  if (!reconstruction) return forward(reconstruction);
+  progress.report(0.95, "writing");
+  if (const auto written = write_reconstruction(*reconstruction, command.out, common.threads);
+      !written) {
+    return forward(written);
+  }
+  return report_of(*reconstruction, command.out);
+}
+
+}  // namespace skullstation

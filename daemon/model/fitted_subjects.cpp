@@ -1,0 +1,186 @@
+#include "daemon/model/fitted_subjects.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "reconstruction/io/mesh_file.h"
+#include "reconstruction/registration/head_registration.h"
+#include "reconstruction/registration/skull_registration.h"
+#include "reconstruction/statistics/subject_file.h"
+#include "reconstruction/statistics/tissue_thickness.h"
+
+namespace skullstation {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double least_facial_share = 0.5;
+constexpr double worst_facial_mean_mm = 2.0;
+
+std::vector<fs::path> subject_folders(const fs::path& subjects) {
+  std::vector<fs::path> folders;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(subjects, error)) {
+    if (fs::exists(entry.path() / "skull.ply")) folders.push_back(entry.path());
+  }
+  std::ranges::sort(folders);
+  return folders;
+}
+
+template <class Matrix>
+std::string_view bytes_of(const Matrix& matrix) {
+  return {reinterpret_cast<const char*>(matrix.data()),
+          static_cast<std::size_t>(matrix.size()) * sizeof(typename Matrix::Scalar)};
+}
+
+std::string templates_sha256(const SkullTemplate& skull, const HeadTemplate& head) {
+  return sha256_hex(sha256_hex(bytes_of(skull.vertices)) + sha256_hex(bytes_of(skull.tetrahedra)) +
+                    sha256_hex(bytes_of(head.vertices)) + sha256_hex(bytes_of(head.triangles)));
+}
+
+/// Sex, age and body mass index, as far as subject.json tells them.
+Result<void> read_facts(const fs::path& file, ModelSubject& subject) {
+  if (!fs::exists(file)) return {};
+  const auto text = read_file(file);
+  if (!text) return forward(text);
+  const auto json = nlohmann::json::parse(*text, nullptr, false);
+  if (!json.is_object()) {
+    return fail(ErrorKind::bad_input, file.string(), "is not a JSON object", "write it again");
+  }
+  if (const auto sex = json.find("sex"); sex != json.end() && sex->is_string()) {
+    const auto word = sex->get<std::string>();
+    if (word == "male" || word == "M") subject.facts.male = 1.0;
+    if (word == "female" || word == "F") subject.facts.male = 0.0;
+  }
+  const auto number = [&](const char* name, std::optional<double>& value) {
+    if (const auto found = json.find(name); found != json.end() && found->is_number()) {
+      value = found->get<double>();
+    }
+  };
+  number("age_years", subject.facts.age_years);
+  number("bmi", subject.facts.body_mass_index);
+  return {};
+}
+
+Result<ModelSubject> fit_subject(const fs::path& folder, const SkullTemplate& skull,
+                                 const HeadTemplate& head, const SubjectFitOptions& options,
+                                 const Progress& progress) {
+  ModelSubject subject;
+  subject.name = folder.filename().string();
+  if (const auto read = read_facts(folder / "subject.json", subject); !read) return forward(read);
+  const auto bone = read_mesh(folder / "skull.ply");
+  if (!bone) return forward(bone);
+  const auto skin = read_mesh(folder / "skin.ply");
+  if (!skin) return forward(skin);
+
+  SkullRegistrationOptions skull_options;
+  skull_options.seed = options.seed;
+  skull_options.threads = options.threads;
+  const auto skull_fit = register_skull(skull, *bone, skull_options, progress.part(0.0, 0.8));
+  if (!skull_fit) return forward(skull_fit);
+  if (skull_fit->quality.facial.mean_mm > worst_facial_mean_mm) {
+    return fail(ErrorKind::no_result, folder.string(),
+                fmt::format("the template lies {:.1f} mm from the face of its skull on average",
+                            skull_fit->quality.facial.mean_mm),
+                "look at the skull's surface");
+  }
+  if (skull_fit->quality.observed_share < least_facial_share) {
+    return fail(ErrorKind::no_result, folder.string(),
+                fmt::format("only {:.0f} % of the skull's outside is there",
+                            100.0 * skull_fit->quality.observed_share));
+  }
+  HeadRegistrationOptions head_options;
+  head_options.pose = &skull_fit->input_from_template;
+  head_options.seed = options.seed;
+  head_options.threads = options.threads;
+  const auto head_fit = register_head(head, *skin, head_options, progress.part(0.8, 1.0));
+  if (!head_fit) return forward(head_fit);
+
+  subject.skull = skull_fit->vertices;
+  subject.skull_observed = skull_fit->observed;
+  subject.head = head_fit->vertices;
+  std::vector<bool> measurable = skull_fit->observed;
+  for (std::size_t v = 0; v < measurable.size(); ++v) {
+    if (!skull.outer[v]) measurable[v] = false;
+  }
+  ThicknessOptions thickness;
+  thickness.threads = options.threads;
+  const auto depths =
+      tissue_thickness(surface_of(skull, skull_fit->vertices), measurable, *skin, thickness);
+  if (!depths) return forward(depths);
+  subject.tissue_mm = *depths;
+  return subject;
+}
+
+}  // namespace
+
+Result<std::vector<SubjectFit>> fit_subjects(const fs::path& subjects, const SkullTemplate& skull,
+                                             const HeadTemplate& head,
+                                             const SubjectFitOptions& options,
+                                             const Progress& progress) {
+  const std::vector<fs::path> folders = subject_folders(subjects);
+  if (folders.empty()) {
+    return fail(ErrorKind::bad_input, subjects.string(),
+                "holds no subject: no folder in it has a skull.ply",
+                "make subjects by \"ct import\" or \"phantom\"");
+  }
+  if (const auto made = make_writable_folder(options.fits); !made) return forward(made);
+  const std::string templates = templates_sha256(skull, head);
+  std::vector<SubjectFit> fits;
+  for (std::size_t i = 0; i < folders.size(); ++i) {
+    if (progress.stop.stop_requested()) {
+      return fail(ErrorKind::cancelled, subjects.string(), "stopped by the operator");
+    }
+    const double begin = static_cast<double>(i) / static_cast<double>(folders.size());
+    const double end = static_cast<double>(i + 1) / static_cast<double>(folders.size());
+    progress.report(begin, folders[i].filename().string());
+    SubjectFit fit;
+    fit.subject.name = folders[i].filename().string();
+    std::string surfaces;
+    for (const char* file : {"skull.ply", "skin.ply"}) {
+      const auto bytes = read_file(folders[i] / file);
+      if (!bytes) {
+        fit.failure = bytes.error().message();
+        break;
+      }
+      surfaces += sha256_hex(*bytes);
+    }
+    if (!fit.failure.empty()) {
+      fits.push_back(std::move(fit));
+      continue;
+    }
+    fit.surfaces_sha256 = sha256_hex(surfaces);
+    const std::string key = sha256_hex(fit.surfaces_sha256 + templates + SKULLSTATION_VERSION +
+                                       std::to_string(options.seed));
+    const fs::path kept = options.fits / (fit.subject.name + ".h5");
+    if (auto bytes = read_file(kept); bytes) {
+      auto stored = decode_subject(*std::move(bytes), kept.string());
+      if (stored && stored->key == key) {
+        fit.subject = std::move(stored->subject);
+        fit.from_before = true;
+        fits.push_back(std::move(fit));
+        continue;
+      }
+    }
+    auto subject = fit_subject(folders[i], skull, head, options, progress.part(begin, end));
+    if (!subject) {
+      if (subject.error().kind == ErrorKind::cancelled) return forward(subject);
+      fit.failure = subject.error().message();
+      fits.push_back(std::move(fit));
+      continue;
+    }
+    fit.subject = *std::move(subject);
+    const auto encoded = encode_subject({key, fit.subject});
+    if (!encoded) return forward(encoded);
+    if (const auto written = write_file_durably(kept, *encoded); !written) return forward(written);
+    fits.push_back(std::move(fit));
+  }
+  return fits;
+}
+
+}  // namespace skullstation

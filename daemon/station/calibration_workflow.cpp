@@ -1,0 +1,61 @@
+#include "daemon/station/calibration_workflow.h"
+
+#include <fmt/format.h>
+
+#include "daemon/station/station.h"
+
+namespace skullstation {
+
+void BoardPictures::add(std::string name, const Image8& image, const CharucoBoard& board) {
+  width = image.width;
+  height = image.height;
+  views.push_back({std::move(name), detect_board(image, board)});
+}
+
+Result<BoardPictures> photograph_board(StationConfig config, const std::string& camera_id,
+                                       const OperatorPrompts& prompts, std::uint64_t seed,
+                                       int threads, const Progress& progress) {
+  std::erase_if(config.cameras, [&](const CameraConfig& c) { return c.id != camera_id; });
+  config.calibration_folder.clear();
+  auto station = open_station(config, RoomSetting::board_in_hand, seed, threads);
+  if (!station) return forward(station);
+  StationCamera& camera = station->cameras.front();
+  const auto poses =
+      calibration_poses(simulated_lens(camera.config), camera.config.simulated.distance_mm);
+  BoardPictures pictures;
+  pictures.device = device_name(*camera.camera);
+  pictures.taken = station->clock->utc_now();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::string name = fmt::format("view {} of {}", i + 1, poses.size());
+    progress.report(static_cast<double>(i) / static_cast<double>(poses.size()), name);
+    if (station->room) {
+      station->room->hold_board(camera.config, poses[i]);
+    } else {
+      prompts.tell(
+          fmt::format("{}: hold the board aslant, in another direction and part of the picture "
+                      "each time, near and far in turn; then press the button.",
+                      name));
+      if (const auto ready = wait_for_confirmation(station->hardware, progress.stop); !ready) {
+        return forward(ready);
+      }
+    }
+    const auto frame =
+        camera.camera->frame_after(station->clock->now(), config.scan.frame_timeout, progress.stop);
+    if (!frame) return forward(frame);
+    pictures.add(name, frame->image, config.board);
+  }
+  return pictures;
+}
+
+Result<CameraCalibrationReport> calibrate_from(const BoardPictures& pictures,
+                                               const CharucoBoard& board,
+                                               const std::string& camera_id) {
+  auto report = calibrate_camera(pictures.views, board, pictures.width, pictures.height);
+  if (!report) return report;
+  report->calibration.camera = camera_id;
+  report->calibration.device = pictures.device;
+  report->calibration.created = to_iso8601(pictures.taken);
+  return report;
+}
+
+}  // namespace skullstation
