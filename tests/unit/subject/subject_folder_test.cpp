@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/staged_folder.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/distance/shapes.h"
 
@@ -60,7 +61,7 @@ TEST(SubjectFolder, IsWrittenIntoAnEmptyFolderButNotOverAnother) {
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().kind, ErrorKind::usage);
   ASSERT_TRUE(write_file_durably(folder / "file", "x"));
-  EXPECT_FALSE(check_subject_folder(folder / "file"));
+  EXPECT_FALSE(check_new_folder(folder / "file"));
   EXPECT_FALSE(write_subject_folder(small_surfaces(), {}, folder / "file" / "s", 1));
 }
 
