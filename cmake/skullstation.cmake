@@ -14,15 +14,36 @@ if(SKULLSTATION_SANITIZE)
   target_link_options(skullstation_build_flags INTERFACE -fsanitize=${SKULLSTATION_SANITIZE})
 endif()
 
-# skullstation_library(NAME SOURCES a.cpp ... [PUBLIC targets ...] [PRIVATE targets ...])
-# makes the static library skullstation_NAME, alias skullstation::NAME.
+# What nearly every source includes of other people's headers is compiled once: a third of the time
+# of a small source. The preset `dev` goes without and so proves that each source includes what it
+# uses.
+function(skullstation_precompile_words)
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/words.cpp CONTENT "")
+  add_library(skullstation_words OBJECT ${PROJECT_BINARY_DIR}/words.cpp)
+  target_link_libraries(skullstation_words
+    PRIVATE skullstation_build_flags Eigen3::Eigen Threads::Threads fmt::fmt
+            nlohmann_json::nlohmann_json)
+  target_include_directories(skullstation_words SYSTEM PRIVATE ${TL_EXPECTED_INCLUDE_DIR})
+  target_precompile_headers(skullstation_words PRIVATE
+    <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <algorithm> <array> <chrono> <cmath>
+    <filesystem> <fmt/format.h> <functional> <map> <memory> <nlohmann/json.hpp> <optional> <span>
+    <string> <tl/expected.hpp> <utility> <vector>)
+endfunction()
+
+# skullstation_library(NAME SOURCES a.cpp ... [PUBLIC targets ...] [PRIVATE targets ...]
+#                      [WITHOUT_WORDS])
+# makes the static library skullstation_NAME, alias skullstation::NAME. WITHOUT_WORDS: for what is
+# compiled with other flags or another Eigen than everything else.
 function(skullstation_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "WITHOUT_WORDS" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(skullstation_${name} STATIC ${ARG_SOURCES})
   add_library(skullstation::${name} ALIAS skullstation_${name})
   target_link_libraries(skullstation_${name}
     PUBLIC skullstation_build_flags ${ARG_PUBLIC}
-    PRIVATE ${ARG_PRIVATE})
+    PRIVATE ${ARG_PRIVATE} fmt::fmt)
+  if(SKULLSTATION_PCH AND NOT ARG_WITHOUT_WORDS)
+    target_precompile_headers(skullstation_${name} REUSE_FROM skullstation_words)
+  endif()
 endfunction()
 
 # What tests do themselves is quick; what they test is compiled as it ships.

@@ -22,6 +22,16 @@ Eigen::Matrix4d Similarity3::matrix() const {
   return m;
 }
 
+std::array<std::array<double, 4>, 4> matrix_rows(const Eigen::Matrix4d& matrix) {
+  std::array<std::array<double, 4>, 4> rows{};
+  for (std::size_t r = 0; r < 4; ++r) {
+    for (std::size_t c = 0; c < 4; ++c) {
+      rows[r][c] = matrix(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+    }
+  }
+  return rows;
+}
+
 Rigid3 rotation_about_z(double angle_deg) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(radians(angle_deg), Eigen::Vector3d::UnitZ())),
           Eigen::Vector3d::Zero()};

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 
 namespace skullstation {
 
@@ -44,6 +45,9 @@ struct Similarity3 {
   }
   Eigen::Matrix4d matrix() const;
 };
+
+/// A transform's matrix row by row, as files carry it.
+std::array<std::array<double, 4>, 4> matrix_rows(const Eigen::Matrix4d& matrix);
 
 /// Rotation about +z by `angle_deg`, counter-clockwise seen from +z.
 Rigid3 rotation_about_z(double angle_deg);

@@ -181,6 +181,12 @@ void add_commands(CLI::App& app, Command& chosen) {
         ct_import.add_option("--hu-offset", o.read.hu_offset, "added to every value");
         ct_import.add_flag("--infer-hu-offset", o.read.infer_hu_offset,
                            "find that offset by the air round the head");
+        ct_import.add_option("--sex", o.sex, "male or female, where the scan does not tell")
+            ->check(CLI::IsMember({"male", "female"}));
+        ct_import.add_option("--age", o.age_years, "years, where the scan does not tell")
+            ->check(CLI::Range(0, 130));
+        ct_import.add_option("--bmi", o.body_mass_index, "body mass index, if known")
+            ->check(CLI::Range(8.0, 100.0));
         add_surface_options(ct_import, o.surfaces);
       });
 
@@ -281,14 +287,14 @@ void add_commands(CLI::App& app, Command& chosen) {
       });
   add<ModelInfoCommand>(*model, "info", "what a model file holds", chosen,
                         [](CLI::App& info, ModelInfoCommand& o) {
-                          info.add_option("MODEL", o.model, "model file")->required();
+                          info.add_option("MODEL", o.model, "model file; without: the default model");
                         });
 
   add<ApproximateCommand>(
       app, "approximate", "from a skull to a face with its variants and uncertainty", chosen,
       [](CLI::App& approximate, ApproximateCommand& o) {
         approximate.add_option("SKULL", o.skull, "PLY, OBJ or STL, in mm")->required();
-        approximate.add_option("--model", o.model, "model file")->required();
+        approximate.add_option("--model", o.model, "model file; without: the default model");
         approximate.add_option("--out", o.out, "case folder, new")->required();
         approximate.add_option("--sex", o.sex, "male or female, if known")
             ->check(CLI::IsMember({"male", "female"}));

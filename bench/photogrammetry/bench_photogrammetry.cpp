@@ -3,12 +3,10 @@
 // others reach on such work.
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <time.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -18,6 +16,7 @@
 #include "bench/photogrammetry/bench_scene.h"
 #include "bench/photogrammetry/bench_views.h"
 #include "bench/photogrammetry/surface_measures.h"
+#include "bench/seconds.h"
 #include "core/session/image_file.h"
 #include "reconstruction/io/glb.h"
 #include "reconstruction/io/ply.h"
@@ -36,39 +35,26 @@ struct Options {
   bool physics = false;
 };
 
-double processor_s() {
-  timespec used{};
-  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
-  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
-}
-
-/// Prints what passed since the last stage: the processor's time counts on a busy machine.
+/// Prints what passed since the last stage.
 class Stopwatch {
  public:
   void lap(std::string_view stage) {
-    const double wall = wall_s() - wall_, processor = processor_s() - processor_;
-    total_wall_ += wall;
-    total_processor_ += processor;
-    print(stage, wall, processor);
-    wall_ = wall_s();
-    processor_ = processor_s();
+    const Seconds passed = Seconds::now() - began_;
+    total_ = total_ + passed;
+    print(stage, passed);
+    began_ = Seconds::now();
   }
-  void total() const { print("all stages", total_wall_, total_processor_); }
+  void total() const { print("all stages", total_); }
 
  private:
-  static double wall_s() {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    return std::chrono::duration<double>(now).count();
-  }
-  static void print(std::string_view stage, double wall, double processor) {
-    rusage usage{};
-    ::getrusage(RUSAGE_SELF, &usage);
-    fmt::print("{:<20} {:>9.1f} {:>9.1f} {:>9}\n", stage, wall, processor, usage.ru_maxrss / 1024);
+  static void print(std::string_view stage, const Seconds& seconds) {
+    fmt::print("{:<20} {:>9.1f} {:>9.1f} {:>9.0f}\n", stage, seconds.wall, seconds.processor,
+               1024.0 * peak_memory_gib());
     std::fflush(stdout);
   }
 
-  double wall_ = wall_s(), processor_ = processor_s();
-  double total_wall_ = 0.0, total_processor_ = 0.0;
+  Seconds began_ = Seconds::now();
+  Seconds total_;
 };
 
 void print_accuracy(const SurfaceMeasures& m, double wall_s) {
@@ -124,9 +110,9 @@ Result<void> print_physics(const Options& options) {
     SurfaceOptions how = SurfaceOptions::of(options.quality, *views);
     how.threads = options.threads;
     how.texture.reset();
-    const double begin_s = processor_s();
+    const Seconds began = Seconds::now();
     const auto surface = reconstruct_surface(*views, how);
-    const double passed_s = processor_s() - begin_s;
+    const double passed_s = (Seconds::now() - began).processor;
     if (!surface) {
       fmt::print("{:>6} {:>6} {}\n", views->size(), variant.noise_sd, surface.error().message());
       continue;
@@ -151,7 +137,7 @@ Result<void> run(const Options& options) {
   const std::filesystem::path& folder = *made;
   fmt::print("scene {}\n{:<20} {:>9} {:>9} {:>9}\n", folder.string(), "", "wall s", "CPU s",
              "peak MB");
-  const auto start = std::chrono::steady_clock::now();
+  const Seconds start = Seconds::now();
   Stopwatch watch;
   const auto views = load_bench_views(folder, {.threads = options.threads});
   if (!views) return forward(views);
@@ -162,8 +148,7 @@ Result<void> run(const Options& options) {
   const auto surface = reconstruct_surface(*views, how);
   if (!surface) return forward(surface);
   watch.total();
-  const double wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double wall_s = (Seconds::now() - start).wall;
 
   const auto truth = read_ply(folder / "truth.ply");
   if (!truth) return forward(truth);

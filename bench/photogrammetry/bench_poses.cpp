@@ -7,13 +7,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "bench/seconds.h"
 #include "core/file.h"
 #include "core/session/image_file.h"
 #include "reconstruction/photogrammetry/masks.h"
@@ -25,23 +24,17 @@ namespace {
 using namespace skullstation;
 namespace fs = std::filesystem;
 
-/// Wall and CPU seconds since the last look.
+/// Seconds since the last look.
 class StopWatch {
  public:
   std::string look() {
-    const auto now = std::chrono::steady_clock::now();
-    const std::clock_t cpu = std::clock();
-    const std::string text = fmt::format("{:6.2f} s wall {:6.2f} s CPU",
-                                         std::chrono::duration<double>(now - wall_).count(),
-                                         static_cast<double>(cpu - cpu_) / CLOCKS_PER_SEC);
-    wall_ = now;
-    cpu_ = cpu;
-    return text;
+    const Seconds passed = Seconds::now() - began_;
+    began_ = Seconds::now();
+    return fmt::format("{:6.2f} s wall {:6.2f} s CPU", passed.wall, passed.processor);
   }
 
  private:
-  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
-  std::clock_t cpu_ = std::clock();
+  Seconds began_ = Seconds::now();
 };
 
 Rigid3 pose_of(const nlohmann::json& rows) {

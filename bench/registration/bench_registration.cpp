@@ -1,6 +1,6 @@
 // How well and how fast templates are registered, as Markdown tables beside the targets of
 // docs/registration.md. Usage:
-//   bench_registration skulls TEMPLATE [N = 20] [seed = 1000]    people that no setting was made on
+//   bench_registration skulls TEMPLATE [N = 20] [seed = 1000]    people of a seed of their own
 //   bench_registration heads  TEMPLATE [N = 20] [seed = 1000]
 //   bench_registration mesh   TEMPLATE SKULL.ply...              real skulls
 //   bench_registration poses  TEMPLATE [N = 100] [SKULL.ply...]  global registration alone
@@ -12,11 +12,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "bench/seconds.h"
 #include "core/random.h"
 #include "core/units.h"
 #include "reconstruction/io/mesh_file.h"
@@ -30,8 +30,6 @@ namespace skullstation {
 namespace {
 
 constexpr double kPersonEdge_mm = 1.0;
-
-double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 Similarity3 random_pose(Random& random) {
   Similarity3 pose;
@@ -91,9 +89,9 @@ int bench_skulls(const SkullTemplate& skull, int people, std::uint64_t seed) {
     const Person person = maker.make(draw_person(mix(seed, static_cast<std::uint64_t>(i))), 0);
     Random random(mix(seed + 1, static_cast<std::uint64_t>(i)));
     const Similarity3 pose = random_pose(random);
-    const double began = processor_seconds();
+    const Seconds began = Seconds::now();
     const auto fit = register_skull(skull, moved(pose, person.skull));
-    const double seconds = processor_seconds() - began;
+    const double seconds = (Seconds::now() - began).processor;
     if (!fit) {
       fmt::print("| {} | {} |\n", i + 1, fit.error().message());
       continue;
@@ -161,9 +159,9 @@ int bench_heads(const HeadTemplate& head, int people, std::uint64_t seed) {
     const Person person = maker.make(draw_person(mix(seed, static_cast<std::uint64_t>(i))), 0);
     Random random(mix(seed + 1, static_cast<std::uint64_t>(i)));
     const Similarity3 pose = random_pose(random);
-    const double began = processor_seconds();
+    const Seconds began = Seconds::now();
     const auto fit = register_head(head, moved(pose, person.skin));
-    const double seconds = processor_seconds() - began;
+    const double seconds = (Seconds::now() - began).processor;
     if (!fit) {
       fmt::print("| {} | {} |\n", i + 1, fit.error().message());
       continue;
@@ -209,7 +207,7 @@ int bench_meshes(const SkullTemplate& skull, const std::vector<std::string>& fil
   int failures = 0;
   for (const std::string& file : files) {
     const auto input = read_mesh(file);
-    const double began = processor_seconds();
+    const Seconds began = Seconds::now();
     const Result<FittedSkull> fit =
         input ? register_skull(skull, *input) : Result<FittedSkull>(forward(input));
     if (!fit) {
@@ -220,7 +218,7 @@ int bench_meshes(const SkullTemplate& skull, const std::vector<std::string>& fil
     const SkullFitQuality& q = fit->quality;
     fmt::print("| {} | {:.3f} | {:.2f} | {:.3f} | {} | {:.3f} | {:.1f} |\n", file, q.facial.mean_mm,
                q.facial.p95_mm, q.outer.mean_mm, q.inverted_tetrahedra, q.observed_share,
-               processor_seconds() - began);
+               (Seconds::now() - began).processor);
   }
   return failures == 0 ? 0 : 1;
 }
@@ -253,17 +251,17 @@ void bench_poses_of(const std::string& name, const TriangleMesh& mesh, const Tri
   Random random(17);
   int found = 0;
   double most_seconds = 0.0;
-  const double began = processor_seconds();
+  const Seconds began = Seconds::now();
   const Eigen::Vector3d center = mesh.vertices.colwise().mean();
   for (int i = 0; i < poses; ++i) {
     const Similarity3 pose = random_pose(random);
     const Eigen::Vector3d direction(random.normal(), random.normal(), random.normal());
     const TriangleMesh part =
         moved(pose, missing > 0.0 ? broken(mesh, direction.normalized(), missing) : mesh);
-    const double start = processor_seconds();
+    const Seconds start = Seconds::now();
     options.seed = static_cast<std::uint64_t>(i) + 1;
     const auto fit = register_globally(part, surface, options);
-    most_seconds = std::max(most_seconds, processor_seconds() - start);
+    most_seconds = std::max(most_seconds, (Seconds::now() - start).processor);
     if (!fit) continue;
     const Similarity3 own = fit->target_from_source * pose;
     const double angle =
@@ -272,7 +270,7 @@ void bench_poses_of(const std::string& name, const TriangleMesh& mesh, const Tri
     found += angle <= 5.0 && shift <= 5.0 ? 1 : 0;
   }
   fmt::print("| {} | {:.0f} % | {} of {} | {:.2f} | {:.2f} |\n", name, 100.0 * missing, found,
-             poses, (processor_seconds() - began) / poses, most_seconds);
+             poses, (Seconds::now() - began).processor / poses, most_seconds);
   std::fflush(stdout);
 }
 

@@ -4,10 +4,10 @@
 #include <time.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <filesystem>
 #include <string>
 
+#include "bench/seconds.h"
 #include "capture/simulation/placement.h"
 #include "capture/simulation/render.h"
 #include "capture/simulation/sensor.h"
@@ -27,23 +27,6 @@ struct Options {
   double elevation_deg = 20.0;
   double first_angle_deg = 0.0;
   bool turned_over = false;
-};
-
-/// Wall and processor time: the latter is what counts on a busy machine.
-struct Seconds {
-  double wall = 0.0;
-  double processor = 0.0;
-
-  static Seconds now() {
-    timespec used{};
-    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
-    const auto wall_time = std::chrono::steady_clock::now().time_since_epoch();
-    return {std::chrono::duration<double>(wall_time).count(),
-            static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec)};
-  }
-  Seconds operator-(const Seconds& o) const { return {wall - o.wall, processor - o.processor}; }
-  Seconds operator+(const Seconds& o) const { return {wall + o.wall, processor + o.processor}; }
-  Seconds operator*(double f) const { return {wall * f, processor * f}; }
 };
 
 void print_row(const char* what, const Seconds& seconds, const char* reference) {

@@ -1,15 +1,14 @@
 // How long the two surfaces of a CT take, how much memory, and how near they are to the truth.
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <time.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <string>
 #include <vector>
 
+#include "bench/seconds.h"
 #include "bench/volume/head_with_distances.h"
 #include "core/parallel.h"
 #include "reconstruction/volume/ct_surfaces.h"
@@ -23,27 +22,6 @@ struct Options {
   bool accuracy_only = false;
   int threads = 0;
 };
-
-/// Wall and processor time: the latter is what counts on a busy machine.
-struct Seconds {
-  double wall = 0.0;
-  double processor = 0.0;
-
-  static Seconds now() {
-    timespec used{};
-    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
-    const auto wall_time = std::chrono::steady_clock::now().time_since_epoch();
-    return {std::chrono::duration<double>(wall_time).count(),
-            static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec)};
-  }
-  Seconds operator-(const Seconds& o) const { return {wall - o.wall, processor - o.processor}; }
-};
-
-double peak_memory_gib() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / (1024.0 * 1024.0);
-}
 
 /// 512 x 512 x 300 voxels that hold the synthetic head from the neck up.
 VoxelGrid large_grid() {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -11,6 +11,7 @@
 #include "capture/calibration/board_pose.h"
 #include "capture/calibration/table_bundle.h"
 #include "capture/calibration/turn_regression.h"
+#include "core/linear_algebra.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -299,8 +300,7 @@ Result<TableCalibrationReport> calibrate_table(const std::vector<TableView>& vie
   const double variance = all_squared_error / freedom;
   // The larger half axis of each error ellipse.
   const auto largest_error = [&](const Eigen::Matrix2d& covariance) {
-    return std::sqrt(variance *
-                     Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues()[1]);
+    return std::sqrt(variance * symmetric_spectrum(covariance).values[1]);
   };
   calibration.axis_error_mm = largest_error(adjusted->axis.topLeftCorner<2, 2>());
   // (x, y, 1) turns by the radians that x, y change, for an axis near the board's normal.

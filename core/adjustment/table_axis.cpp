@@ -1,8 +1,8 @@
 #include "core/adjustment/table_axis.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include "core/linear_algebra.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -37,11 +37,11 @@ std::optional<TableAxis> axis_of_motions(const std::vector<Rigid3>& motions,
   if (!turns || !(direction.z() > 0.5 * direction.norm())) return std::nullopt;
   direction /= direction.z();
   // Along the axis nothing is determined: the smallest solution, moved into the board's plane.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(normal);
+  const SymmetricSpectrum solver = symmetric_spectrum(normal);
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   for (int i = 1; i < 3; ++i) {
-    const Eigen::Vector3d v = solver.eigenvectors().col(i);
-    point += v * (v.dot(right) / solver.eigenvalues()[i]);
+    const Eigen::Vector3d v = solver.vectors.col(i);
+    point += v * (v.dot(right) / solver.values[i]);
   }
   point -= direction * point.z();
   return TableAxis{{point.x(), point.y(), direction.x(), direction.y()}};

@@ -1,7 +1,10 @@
 #include "core/session/board_homography.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
+#include <Eigen/QR>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace skullstation {
 
@@ -50,8 +53,8 @@ std::optional<Homography> fit_homography(const Correspondences& points) {
       rows.block<1, 3>(1, 6) = -px.y() * x.transpose();
       normal += rows.transpose() * rows;
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(normal);
-    const Eigen::Matrix<double, 9, 1> v = solver.eigenvectors().col(0);
+    const SymmetricSpectrum solver = symmetric_spectrum(normal);
+    const Eigen::Matrix<double, 9, 1> v = solver.vectors.col(0);
     fitted << v.segment<3>(0).transpose(), v.segment<3>(3).transpose(), v.segment<3>(6).transpose();
   }
   Eigen::Matrix3d denormalise;

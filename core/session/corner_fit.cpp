@@ -1,7 +1,7 @@
 #include "core/session/corner_fit.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -22,15 +22,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double band_colors_mm = 8.0;
 
-Json json_of(const Similarity3& similarity) {
-  const Eigen::Matrix4d matrix = similarity.matrix();
-  Json rows = Json::array();
-  for (int r = 0; r < 4; ++r) {
-    rows.push_back({matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3)});
-  }
-  return rows;
-}
-
 Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 std::string case_json(const FaceModel& model, const CaseSkull& skull, const FaceEstimate& face,
@@ -58,7 +49,7 @@ std::string case_json(const FaceModel& model, const CaseSkull& skull, const Face
               {{"male", json_of(source.facts.male)},
                {"age_years", json_of(source.facts.age_years)},
                {"body_mass_index", json_of(source.facts.body_mass_index)}}},
-             {"anatomical_from_input", json_of(skull.anatomical_from_input)},
+             {"anatomical_from_input", matrix_rows(skull.anatomical_from_input.matrix())},
              {"skull_fit",
               {{"facial_mean_mm", skull.quality.facial.mean_mm},
                {"facial_p95_mm", skull.quality.facial.p95_mm},

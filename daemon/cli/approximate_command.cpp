@@ -6,8 +6,8 @@
 #include "core/staged_folder.h"
 #include "daemon/case/case_folder.h"
 #include "daemon/cli/commands.h"
+#include "daemon/model/model_source.h"
 #include "reconstruction/io/mesh_file.h"
-#include "reconstruction/statistics/model_file.h"
 
 namespace skullstation {
 
@@ -29,14 +29,12 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   source.input_sha256 = sha256_hex(*input_bytes);
   const auto input = read_mesh(command.skull);
   if (!input) return forward(input);
-  auto model_bytes = read_file(command.model);
-  if (!model_bytes) return forward(model_bytes);
-  source.model = command.model.filename().string();
-  source.model_sha256 = sha256_hex(*model_bytes);
-  const auto model = decode_model(*std::move(model_bytes), command.model.string());
-  if (!model) return forward(model);
-  const auto provenance = nlohmann::json::parse(model->provenance, nullptr, false);
-  if (provenance.is_object()) source.model_card = provenance.value("card", std::string());
+  const auto model_source = load_model(command.model);
+  if (!model_source) return forward(model_source);
+  const FaceModel& model = model_source->model;
+  source.model = model_source->name;
+  source.model_sha256 = model_source->sha256;
+  source.model_card = model_source->card;
   source.program_version = SKULLSTATION_VERSION;
   source.facts = options.facts;
   source.seed = common.seed;
@@ -45,11 +43,11 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   fit_options.unit_unknown = command.unit_unknown;
   fit_options.seed = common.seed;
   fit_options.threads = common.threads;
-  const auto skull = fit_case_skull(*model, *input, fit_options, progress.part(0.05, 0.6));
+  const auto skull = fit_case_skull(model, *input, fit_options, progress.part(0.05, 0.6));
   if (!skull) return forward(skull);
-  const auto face = estimate_face(*model, *skull, options, progress.part(0.6, 0.75));
+  const auto face = estimate_face(model, *skull, options, progress.part(0.6, 0.75));
   if (!face) return forward(face);
-  if (const auto written = write_case_folder(*model, *skull, *face, source, command.out,
+  if (const auto written = write_case_folder(model, *skull, *face, source, command.out,
                                              {.threads = common.threads}, progress.part(0.75, 1.0));
       !written) {
     return forward(written);

@@ -162,14 +162,14 @@ struct ModelEvaluateCommand {
 Result<CommandReport> run(const ModelEvaluateCommand&, const CommonOptions&, const Progress&);
 
 struct ModelInfoCommand {
-  std::filesystem::path model;
+  std::optional<std::filesystem::path> model;  ///< else the default model
 };
 Result<CommandReport> run(const ModelInfoCommand&, const CommonOptions&, const Progress&);
 
 /// From bone to face: a case folder with the face, its variants, uncertainty and report.
 struct ApproximateCommand {
   std::filesystem::path skull;
-  std::filesystem::path model;
+  std::optional<std::filesystem::path> model;  ///< else the default model
   std::filesystem::path out;
   std::optional<std::string> sex;  ///< "male" or "female"
   std::optional<double> age_years;
@@ -190,6 +190,9 @@ struct CtImportCommand {
   std::filesystem::path input;  ///< DICOM folder or file, NIfTI, NRRD, MetaImage
   std::filesystem::path out;    ///< the subject's folder; must not exist yet
   VolumeReadOptions read;
+  std::optional<std::string> sex;  ///< "male" or "female"; else as the scan says
+  std::optional<int> age_years;    ///< else as the scan says
+  std::optional<double> body_mass_index;
   CtSurfaceOptions surfaces;
 };
 Result<CommandReport> run(const CtImportCommand&, const CommonOptions&, const Progress&);

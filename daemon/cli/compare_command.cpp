@@ -35,14 +35,6 @@ nlohmann::ordered_json json_of(const DistanceStatistics& s, double bin_mm) {
           {"histogram", {{"bin_mm", bin_mm}, {"share_of_area", s.histogram}}}};
 }
 
-/// 4x4, row by row: x_b = M x_a.
-nlohmann::ordered_json json_of(const Similarity3& b_from_a) {
-  const Eigen::Matrix4d m = b_from_a.matrix();
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (int r = 0; r < 4; ++r) rows.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-  return rows;
-}
-
 std::string row_of(const char* way, const DistanceStatistics& s) {
   return fmt::format("{:<7}{:>9.3f}{:>9.3f}{:>9.3f}{:>9.3f}{:>9.3f}{:>9.3f}\n", way, s.mean_mm,
                      s.rms_mm, s.median_mm, s.p95_mm, s.max_mm, s.signed_mean_mm);
@@ -128,7 +120,7 @@ Result<CommandReport> run(const CompareCommand& command, const CommonOptions& co
   nlohmann::ordered_json json = {{"a", command.a.string()},
                                  {"b", command.b.string()},
                                  {"align", to_string(command.align)},
-                                 {"b_from_a", json_of(comparison->b_from_a)},
+                                 {"b_from_a", matrix_rows(comparison->b_from_a.matrix())},
                                  {"scale", comparison->b_from_a.scale},
                                  {"a_to_b", json_of(comparison->a_to_b, options.histogram_bin_mm)},
                                  {"b_to_a", json_of(comparison->b_to_a, options.histogram_bin_mm)},

@@ -43,6 +43,9 @@ Result<CommandReport> run(const CtImportCommand& command, const CommonOptions& c
 
   auto volume = read_volume(command.input, command.read, progress.part(0.0, 0.25));
   if (!volume) return forward(volume);
+  if (command.sex) volume->info.sex = *command.sex == "male" ? "M" : "F";
+  if (command.age_years) volume->info.age_years = command.age_years;
+  if (command.body_mass_index) volume->info.body_mass_index = command.body_mass_index;
   const SubjectSource source{volume->info, volume->grid, volume_sha256(*volume), options,
                              SKULLSTATION_VERSION};
   const auto surfaces = extract_ct_surfaces(*std::move(volume), options, progress.part(0.25, 0.85));

@@ -36,15 +36,6 @@ Json json_of(const FitStages& stages) {
   return list;
 }
 
-Json json_of(const Similarity3& similarity) {
-  const Eigen::Matrix4d matrix = similarity.matrix();
-  Json rows = Json::array();
-  for (int r = 0; r < 4; ++r) {
-    rows.push_back({matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3)});
-  }
-  return rows;
-}
-
 Json json_of(const std::vector<TemplateLandmark>& landmarks, const Points3& vertices) {
   const Points3 positions = landmark_positions(landmarks, vertices);
   Json list = Json::array();
@@ -111,7 +102,7 @@ Result<CommandReport> run(const FitSkullCommand& command, const CommonOptions& c
                      {"kind", "skull"},
                      {"input", command.mesh.string()},
                      {"templates", command.templates.string()},
-                     {"input_from_template", json_of(fit->input_from_template)},
+                     {"input_from_template", matrix_rows(fit->input_from_template.matrix())},
                      {"facial", json_of(quality.facial)},
                      {"outer", json_of(quality.outer)},
                      {"inverted_tetrahedra", quality.inverted_tetrahedra},
@@ -157,7 +148,7 @@ Result<CommandReport> run(const FitHeadCommand& command, const CommonOptions& co
                      {"kind", "head"},
                      {"input", command.mesh.string()},
                      {"templates", command.templates.string()},
-                     {"input_from_template", json_of(fit->input_from_template)},
+                     {"input_from_template", matrix_rows(fit->input_from_template.matrix())},
                      {"weighted_rms_mm", quality.weighted_rms_mm},
                      {"kept_share", quality.kept_share},
                      {"kept", json_of(quality.kept)},

@@ -7,6 +7,7 @@
 #include "core/file.h"
 #include "daemon/cli/commands.h"
 #include "daemon/model/fitted_subjects.h"
+#include "daemon/model/model_source.h"
 #include "reconstruction/statistics/build_face_model.h"
 #include "reconstruction/statistics/model_file.h"
 #include "reconstruction/statistics/model_quality.h"
@@ -131,37 +132,31 @@ Result<CommandReport> run(const ModelBuildCommand& command, const CommonOptions&
 }
 
 Result<CommandReport> run(const ModelInfoCommand& command, const CommonOptions&, const Progress&) {
-  auto bytes = read_file(command.model);
-  if (!bytes) return forward(bytes);
-  const std::string hash = sha256_hex(*bytes);
-  const auto model = decode_model(*std::move(bytes), command.model.string());
-  if (!model) return forward(model);
-  const auto provenance = Json::parse(model->provenance, nullptr, false);
-  const std::string card =
-      provenance.is_object() ? provenance.value("card", std::string()) : std::string();
+  const auto source = load_model(command.model);
+  if (!source) return forward(source);
+  const FaceModel& model = source->model;
   CommandReport report;
   report.text = fmt::format(
       "{}\nsha256 {}\n{} subjects\nskull: {} vertices, {} modes\nhead: {} vertices, {} modes\n"
       "tissue: {} modes\njoint model: {} variables, shrinkage {:.3f}\n",
-      card, hash, model->joint.subjects, model->skull.vertex_count(), model->skull.mode_count(),
-      model->head.vertex_count(), model->head.mode_count(), model->tissue.mode_count(),
-      model->joint.names.size(), model->joint.shrinkage);
+      source->card, source->sha256, model.joint.subjects, model.skull.vertex_count(),
+      model.skull.mode_count(), model.head.vertex_count(), model.head.mode_count(),
+      model.tissue.mode_count(), model.joint.names.size(), model.joint.shrinkage);
   Json bands = Json::array();
-  for (const BandFactor& band : model->bands) {
+  for (const BandFactor& band : model.bands) {
     bands.push_back({{"region", band.region}, {"level", band.level}, {"factor", band.factor}});
     report.text +=
         fmt::format("{:.0f} % band, {}: {:.2f} SD\n", 100.0 * band.level, band.region, band.factor);
   }
-  report.json = Json{
-      {"model", command.model.string()},
-      {"sha256", hash},
-      {"subjects", model->joint.subjects},
-      {"skull_modes", model->skull.mode_count()},
-      {"head_modes", model->head.mode_count()},
-      {"tissue_modes", model->tissue.mode_count()},
-      {"bands", bands},
-      {"provenance",
-       provenance}}.dump(2);
+  report.json = Json{{"model", source->name},
+                     {"sha256", source->sha256},
+                     {"subjects", model.joint.subjects},
+                     {"skull_modes", model.skull.mode_count()},
+                     {"head_modes", model.head.mode_count()},
+                     {"tissue_modes", model.tissue.mode_count()},
+                     {"bands", bands},
+                     {"provenance", Json::parse(model.provenance, nullptr, false)}}
+                    .dump(2);
   return report;
 }
 

@@ -5,6 +5,7 @@
 
 #include "core/file.h"
 #include "core/session/image_file.h"
+#include "core/staged_folder.h"
 #include "daemon/cli/commands.h"
 #include "reconstruction/io/glb.h"
 #include "reconstruction/io/ply.h"
@@ -77,7 +78,6 @@ Result<void> write_parts(const SessionReconstruction& reconstruction, const fs::
   const TriangleMesh by_coverage = colored_by_coverage(mesh, coverage.views);
   const auto cameras = format_session(reconstruction.cameras);
   if (!cameras) return forward(cameras);
-  if (const auto made = make_writable_folder(folder); !made) return made;
   for (const auto& written :
        {write_ply(mesh, folder / "skull.ply"),
         write_model(reconstruction.surface, folder / "skull.glb"),
@@ -93,25 +93,14 @@ Result<void> write_parts(const SessionReconstruction& reconstruction, const fs::
   return {};
 }
 
-/// All files under a name of their own first: the folder appears whole or not at all.
 Result<void> write_reconstruction(const SessionReconstruction& reconstruction, const fs::path& out,
                                   int threads) {
-  fs::path partial = out.lexically_normal();
-  if (!partial.has_filename()) partial = partial.parent_path();
-  partial += ".partial";
-  std::error_code error;
-  fs::remove_all(partial, error);
-  if (const auto written = write_parts(reconstruction, partial, threads); !written) {
-    fs::remove_all(partial, error);
+  StagedFolder staged(out);
+  if (const auto made = staged.make(); !made) return made;
+  if (const auto written = write_parts(reconstruction, staged.path(), threads); !written) {
     return written;
   }
-  fs::rename(partial, out.lexically_normal(), error);
-  if (error) {
-    const std::string reason = error.message();
-    fs::remove_all(partial, error);
-    return fail(ErrorKind::bad_input, out.string(), "can't be written: " + reason);
-  }
-  return {};
+  return staged.put_in_place();
 }
 
 CommandReport report_of(const SessionReconstruction& reconstruction, const fs::path& out) {
@@ -143,11 +132,7 @@ CommandReport report_of(const SessionReconstruction& reconstruction, const fs::p
 
 Result<CommandReport> run(const ReconstructCommand& command, const CommonOptions& common,
                           const Progress& progress) {
-  std::error_code ignored;
-  if (fs::exists(command.out, ignored) && !fs::is_empty(command.out, ignored)) {
-    return fail(ErrorKind::usage, command.out.string(), "exists and is not empty",
-                "give a folder that does not exist yet");
-  }
+  if (const auto fresh = check_new_folder(command.out); !fresh) return forward(fresh);
   const auto session = read_session(command.session);
   if (!session) return forward(session);
   if (session->views.empty()) {

@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
+#include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/parallel.h"
 #include "reconstruction/io/mesh_file.h"
 #include "reconstruction/registration/head_registration.h"
 #include "reconstruction/registration/skull_registration.h"
@@ -26,7 +27,10 @@ std::vector<fs::path> subject_folders(const fs::path& subjects) {
   std::vector<fs::path> folders;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(subjects, error)) {
-    if (fs::exists(entry.path() / "skull.ply")) folders.push_back(entry.path());
+    // A skin without skull, or the reverse, is a mistake that has to be named.
+    const bool is_subject =
+        fs::exists(entry.path() / "skull.ply") || fs::exists(entry.path() / "skin.ply");
+    if (is_subject) folders.push_back(entry.path());
   }
   std::ranges::sort(folders);
   return folders;
@@ -117,6 +121,53 @@ Result<ModelSubject> fit_subject(const fs::path& folder, const SkullTemplate& sk
   return subject;
 }
 
+Result<std::string> surfaces_sha256(const fs::path& folder) {
+  std::string surfaces;
+  for (const char* file : {"skull.ply", "skin.ply"}) {
+    const auto bytes = read_file(folder / file);
+    if (!bytes) return forward(bytes);
+    surfaces += sha256_hex(*bytes);
+  }
+  return sha256_hex(surfaces);
+}
+
+/// One subject, fitted now or before. Fails only for what ends the whole run: a stop, or a folder
+/// that can't be written.
+Result<SubjectFit> fitted_subject(const fs::path& folder, const SkullTemplate& skull,
+                                  const HeadTemplate& head, const std::string& templates,
+                                  const SubjectFitOptions& options, const Progress& progress) {
+  SubjectFit fit;
+  fit.subject.name = folder.filename().string();
+  const auto surfaces = surfaces_sha256(folder);
+  if (!surfaces) {
+    fit.failure = surfaces.error().message();
+    return fit;
+  }
+  fit.surfaces_sha256 = *surfaces;
+  const std::string key = sha256_hex(fit.surfaces_sha256 + templates + SKULLSTATION_VERSION +
+                                     std::to_string(options.seed));
+  const fs::path kept = options.fits / (fit.subject.name + ".h5");
+  if (auto bytes = read_file(kept); bytes) {
+    auto stored = decode_subject(*std::move(bytes), kept.string());
+    if (stored && stored->key == key) {
+      fit.subject = std::move(stored->subject);
+      fit.from_before = true;
+      return fit;
+    }
+  }
+  auto subject = fit_subject(folder, skull, head, options, progress);
+  if (!subject) {
+    if (subject.error().kind == ErrorKind::cancelled) return forward(subject);
+    fit.failure = subject.error().message();
+    return fit;
+  }
+  fit.subject = *std::move(subject);
+  const auto encoded = encode_subject({key, fit.subject});
+  if (!encoded) return forward(encoded);
+  if (const auto written = write_file_durably(kept, *encoded); !written) return forward(written);
+  return fit;
+}
+
 }  // namespace
 
 Result<std::vector<SubjectFit>> fit_subjects(const fs::path& subjects, const SkullTemplate& skull,
@@ -126,59 +177,35 @@ Result<std::vector<SubjectFit>> fit_subjects(const fs::path& subjects, const Sku
   const std::vector<fs::path> folders = subject_folders(subjects);
   if (folders.empty()) {
     return fail(ErrorKind::bad_input, subjects.string(),
-                "holds no subject: no folder in it has a skull.ply",
+                "holds no subject: no folder in it has a skull.ply or skin.ply",
                 "make subjects by \"ct import\" or \"phantom\"");
   }
   if (const auto made = make_writable_folder(options.fits); !made) return forward(made);
   const std::string templates = templates_sha256(skull, head);
-  std::vector<SubjectFit> fits;
-  for (std::size_t i = 0; i < folders.size(); ++i) {
+  // A subject a thread: most of a fit is one solver after the other.
+  SubjectFitOptions alone = options;
+  alone.threads = 1;
+  Progress quiet;
+  quiet.stop = progress.stop;
+  std::vector<Result<SubjectFit>> attempts(folders.size());
+  std::mutex one_at_a_time;
+  std::size_t finished = 0;
+  parallel_for(static_cast<int>(folders.size()), options.threads, [&](int i) {
+    const auto at = static_cast<std::size_t>(i);
     if (progress.stop.stop_requested()) {
-      return fail(ErrorKind::cancelled, subjects.string(), "stopped by the operator");
+      attempts[at] = fail(ErrorKind::cancelled, subjects.string(), "stopped by the operator");
+      return;
     }
-    const double begin = static_cast<double>(i) / static_cast<double>(folders.size());
-    const double end = static_cast<double>(i + 1) / static_cast<double>(folders.size());
-    progress.report(begin, folders[i].filename().string());
-    SubjectFit fit;
-    fit.subject.name = folders[i].filename().string();
-    std::string surfaces;
-    for (const char* file : {"skull.ply", "skin.ply"}) {
-      const auto bytes = read_file(folders[i] / file);
-      if (!bytes) {
-        fit.failure = bytes.error().message();
-        break;
-      }
-      surfaces += sha256_hex(*bytes);
-    }
-    if (!fit.failure.empty()) {
-      fits.push_back(std::move(fit));
-      continue;
-    }
-    fit.surfaces_sha256 = sha256_hex(surfaces);
-    const std::string key = sha256_hex(fit.surfaces_sha256 + templates + SKULLSTATION_VERSION +
-                                       std::to_string(options.seed));
-    const fs::path kept = options.fits / (fit.subject.name + ".h5");
-    if (auto bytes = read_file(kept); bytes) {
-      auto stored = decode_subject(*std::move(bytes), kept.string());
-      if (stored && stored->key == key) {
-        fit.subject = std::move(stored->subject);
-        fit.from_before = true;
-        fits.push_back(std::move(fit));
-        continue;
-      }
-    }
-    auto subject = fit_subject(folders[i], skull, head, options, progress.part(begin, end));
-    if (!subject) {
-      if (subject.error().kind == ErrorKind::cancelled) return forward(subject);
-      fit.failure = subject.error().message();
-      fits.push_back(std::move(fit));
-      continue;
-    }
-    fit.subject = *std::move(subject);
-    const auto encoded = encode_subject({key, fit.subject});
-    if (!encoded) return forward(encoded);
-    if (const auto written = write_file_durably(kept, *encoded); !written) return forward(written);
-    fits.push_back(std::move(fit));
+    attempts[at] = fitted_subject(folders[at], skull, head, templates, alone, quiet);
+    const std::lock_guard lock(one_at_a_time);
+    ++finished;
+    progress.report(static_cast<double>(finished) / static_cast<double>(folders.size()),
+                    folders[at].filename().string());
+  });
+  std::vector<SubjectFit> fits;
+  for (auto& attempt : attempts) {
+    if (!attempt) return forward(attempt);
+    fits.push_back(*std::move(attempt));
   }
   return fits;
 }

@@ -42,13 +42,6 @@ Eigen::Quaterniond resting_orientation(int pass) {
   }
 }
 
-nlohmann::ordered_json rows(const Rigid3& transform) {
-  auto json = nlohmann::ordered_json::array();
-  const Eigen::Matrix4d m = transform.matrix();
-  for (int r = 0; r < 4; ++r) json.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-  return json;
-}
-
 }  // namespace
 
 Lens simulated_lens(const CameraConfig& camera) {
@@ -179,7 +172,8 @@ Result<void> SimulatedRoom::write_truth(const std::filesystem::path& file) const
   }
   for (const auto& [image, view] : noted_) {
     views[image] = {{"pass", view.pass}, {"table_angle_deg", view.table_angle_deg}};
-    placements[std::to_string(view.pass)] = {{"table_from_specimen", rows(placement(view.pass))}};
+    placements[std::to_string(view.pass)] = {
+        {"table_from_specimen", matrix_rows(placement(view.pass).matrix())}};
   }
   Json cameras = Json::array();
   for (const CameraConfig& camera : config_.cameras) {
@@ -188,11 +182,11 @@ Result<void> SimulatedRoom::write_truth(const std::filesystem::path& file) const
     cameras.push_back({{"id", camera.id},
                        {"model", to_string(LensModel::opencv)},
                        {"params", optics.lens.params(LensModel::opencv)},
-                       {"camera_from_station", rows(optics.camera_from_station)}});
+                       {"camera_from_station", matrix_rows(optics.camera_from_station.matrix())}});
   }
   const Json truth = {{"format", "skullstation-simulation-truth/1"},
                       {"specimen", config_.simulation.specimen},
-                      {"table_from_board", rows(scene_->board_pose())},
+                      {"table_from_board", matrix_rows(scene_->board_pose().matrix())},
                       {"cameras", cameras},
                       {"passes", placements},
                       {"views", views}};

@@ -75,6 +75,7 @@ std::string subject_json(const SubjectSource& source, const CtQuality& quality) 
       {"unit", "mm"},
       {"sex", text_or_null(info.sex)},
       {"age_years", value_or_null(info.age_years)},
+      {"bmi", value_or_null(info.body_mass_index)},
       {"scan",
        {{"format", info.format},
         {"sha256", source.sha256},

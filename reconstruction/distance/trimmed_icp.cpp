@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "reconstruction/distance/pseudo_normals.h"
 #include "reconstruction/distance/surface_samples.h"
@@ -101,14 +103,13 @@ Result<Similarity3> best_step(const std::vector<Pair>& pairs, const Eigen::Vecto
     right_side += gap * row;
   }
   if (!estimate_scale) normal_matrix(6, 6) = normal_matrix.trace() / 6.0;
-  const Eigen::SelfAdjointEigenSolver<Matrix7> spectrum(normal_matrix);
-  if (!(spectrum.eigenvalues()[0] > 1e-4 * spectrum.eigenvalues()[6])) {
+  const SymmetricSpectrum spectrum = symmetric_spectrum(normal_matrix);
+  if (!(spectrum.values[0] > 1e-4 * spectrum.values[6])) {
     return fail(ErrorKind::no_result, "alignment",
                 "the surfaces slide along each other: their shape doesn't fix the transform");
   }
-  const Vector7 step = spectrum.eigenvectors() *
-                       spectrum.eigenvalues().cwiseInverse().asDiagonal() *
-                       spectrum.eigenvectors().transpose() * right_side;
+  const Vector7 step = spectrum.vectors * spectrum.values.cwiseInverse().asDiagonal() *
+                       spectrum.vectors.transpose() * right_side;
   const double angle = step.head<3>().norm();
   Similarity3 motion;
   if (angle > 0.0) motion.rotation = Eigen::AngleAxisd(angle, step.head<3>() / angle);

@@ -40,17 +40,18 @@ struct HalfEdge {
   std::uint64_t edge = 0;  // both vertices, the lower one first
   bool upwards = false;
   int triangle = 0;
+  int side = 0;
 };
 
-std::vector<HalfEdge> sorted_half_edges(const TriangleMesh& mesh) {
+std::vector<HalfEdge> sorted_half_edges(const Triangles& triangles) {
   std::vector<HalfEdge> half_edges;
-  half_edges.reserve(static_cast<std::size_t>(mesh.triangles.size()));
-  for (int f = 0; f < mesh.triangles.rows(); ++f) {
+  half_edges.reserve(static_cast<std::size_t>(triangles.size()));
+  for (int f = 0; f < triangles.rows(); ++f) {
     for (int side = 0; side < 3; ++side) {
-      const auto from = static_cast<std::uint32_t>(mesh.triangles(f, side));
-      const auto to = static_cast<std::uint32_t>(mesh.triangles(f, (side + 1) % 3));
+      const auto from = static_cast<std::uint32_t>(triangles(f, side));
+      const auto to = static_cast<std::uint32_t>(triangles(f, (side + 1) % 3));
       half_edges.push_back(
-          {(std::uint64_t{std::min(from, to)} << 32) | std::max(from, to), from < to, f});
+          {(std::uint64_t{std::min(from, to)} << 32) | std::max(from, to), from < to, f, side});
     }
   }
   std::ranges::sort(half_edges, {},
@@ -92,7 +93,7 @@ std::size_t count_split_vertices(const TriangleMesh& mesh,
 
 MeshTopology topology_of(const TriangleMesh& mesh) {
   MeshTopology topology;
-  const auto half_edges = sorted_half_edges(mesh);
+  const auto half_edges = sorted_half_edges(mesh.triangles);
   long edges = 0;
   for (std::size_t i = 0; i < half_edges.size();) {
     std::size_t end = i;
@@ -115,6 +116,34 @@ MeshTopology topology_of(const TriangleMesh& mesh) {
   topology.euler_characteristic =
       static_cast<long>(std::ranges::count(used, true)) - edges + mesh.triangles.rows();
   return topology;
+}
+
+std::vector<std::array<bool, 3>> boundary_edges(const Triangles& triangles) {
+  std::vector<std::array<bool, 3>> is_boundary(static_cast<std::size_t>(triangles.rows()),
+                                               {false, false, false});
+  const std::vector<HalfEdge> half_edges = sorted_half_edges(triangles);
+  for (std::size_t h = 0; h < half_edges.size(); ++h) {
+    const std::uint64_t edge = half_edges[h].edge;
+    const bool shared = (h > 0 && half_edges[h - 1].edge == edge) ||
+                        (h + 1 < half_edges.size() && half_edges[h + 1].edge == edge);
+    if (shared) continue;
+    is_boundary[static_cast<std::size_t>(half_edges[h].triangle)]
+               [static_cast<std::size_t>(half_edges[h].side)] = true;
+  }
+  return is_boundary;
+}
+
+std::vector<bool> boundary_vertices(const Triangles& triangles, Eigen::Index vertices) {
+  std::vector<bool> is_boundary(static_cast<std::size_t>(vertices), false);
+  const std::vector<std::array<bool, 3>> edges = boundary_edges(triangles);
+  for (Eigen::Index f = 0; f < triangles.rows(); ++f) {
+    for (int side = 0; side < 3; ++side) {
+      if (!edges[static_cast<std::size_t>(f)][static_cast<std::size_t>(side)]) continue;
+      is_boundary[static_cast<std::size_t>(triangles(f, side))] = true;
+      is_boundary[static_cast<std::size_t>(triangles(f, (side + 1) % 3))] = true;
+    }
+  }
+  return is_boundary;
 }
 
 std::vector<int> component_of_triangles(const TriangleMesh& mesh) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <vector>
@@ -24,6 +25,12 @@ struct MeshTopology {
 };
 
 MeshTopology topology_of(const TriangleMesh& mesh);
+
+/// For each triangle which of its edges, from corner k to corner k + 1, no other triangle shares.
+std::vector<std::array<bool, 3>> boundary_edges(const Triangles& triangles);
+
+/// Which of the `vertices` vertices are an end of such an edge.
+std::vector<bool> boundary_vertices(const Triangles& triangles, Eigen::Index vertices);
 
 /// Number of each triangle's connected component (through shared vertices), in the order of the
 /// components' first triangles.

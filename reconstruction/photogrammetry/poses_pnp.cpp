@@ -1,10 +1,10 @@
 #include "reconstruction/photogrammetry/poses_pnp.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <array>
 #include <cmath>
 
+#include "core/linear_algebra.h"
 #include "core/session/board_homography.h"
 
 namespace skullstation {
@@ -96,8 +96,8 @@ std::optional<Rigid3> homography_pose(const std::vector<BoardCorner>& corners,
   by_mm /= by_mm(2, 2) < 0.0 ? -size : size;
   Eigen::Matrix3d axes;
   axes << by_mm.col(0), by_mm.col(1), by_mm.col(0).cross(by_mm.col(1));
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+  const SingularValues3 svd = singular_values(axes);
+  const Eigen::Matrix3d rotation = svd.u * svd.v.transpose();
   if (!rotation.allFinite() || rotation.determinant() < 0.5) return std::nullopt;
   return Rigid3{Eigen::Quaterniond(rotation).normalized(), by_mm.col(2)};
 }

@@ -1,8 +1,11 @@
 #include "reconstruction/photogrammetry/sfm_frame.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace skullstation {
 
@@ -39,8 +42,8 @@ Eigen::Quaterniond robust_mean(const std::vector<Eigen::Quaterniond>& rotations)
   for (std::size_t i = 0; i < rotations.size(); ++i) {
     if (distances[i] <= limit) sum += rotations[i].coeffs() * rotations[i].coeffs().transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
-  return Eigen::Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3))).normalized();
+  const SymmetricSpectrum solver = symmetric_spectrum(sum);
+  return Eigen::Quaterniond(Eigen::Vector4d(solver.vectors.col(3))).normalized();
 }
 
 /// The point nearest to all cameras' lines of sight.

@@ -1,9 +1,12 @@
 #include "reconstruction/registration/affine_fit.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "core/linear_algebra.h"
 
 namespace skullstation {
 
@@ -79,8 +82,8 @@ Eigen::Affine3d fit_affine(const OrientedPoints& points, const InputSurface& inp
     now = motion * now;
     if (step.norm() < 0.02) break;
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> change(now.linear() * start.linear().inverse());
-  const Eigen::Vector3d lengths = change.singularValues();
+  const SingularValues3 change = singular_values(now.linear() * start.linear().inverse());
+  const Eigen::Vector3d lengths = change.values;
   if (lengths[0] > kMostStretch || lengths[2] < 1.0 / kMostStretch) return start;
   return now;
 }

@@ -2,10 +2,10 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <tuple>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 
 namespace skullstation {
@@ -23,11 +23,10 @@ double cotangent(const Vector& a, const Vector& b) {
 }
 
 Eigen::Matrix3d best_rotation(const Eigen::Matrix3d& now_by_rest) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(now_by_rest,
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0.0) u.col(2) = -u.col(2);
-  return u * svd.matrixV().transpose();
+  const SingularValues3 svd = singular_values(now_by_rest);
+  Eigen::Matrix3d u = svd.u;
+  if ((u * svd.v.transpose()).determinant() < 0.0) u.col(2) = -u.col(2);
+  return u * svd.v.transpose();
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ctime>
 #include <string>
 #include <vector>
 
@@ -25,5 +26,8 @@ struct FitStage {
 };
 
 using FitStages = std::vector<FitStage>;
+
+/// Of all the process's threads together, so far.
+inline double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 }  // namespace skullstation

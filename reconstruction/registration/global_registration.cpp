@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/units.h"
@@ -181,11 +182,11 @@ std::vector<Similarity3> from_triples(const Points3& from, const Points3& to, co
 std::vector<Similarity3> half_turns(const Surface& target) {
   const Points3 centered = target.points.positions.rowwise() - target.center.transpose();
   const Eigen::Matrix3d moments = centered.transpose() * centered;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments);
+  const SymmetricSpectrum axes = symmetric_spectrum(moments);
   std::vector<Similarity3> turns;
   for (int axis = 0; axis < 3; ++axis) {
     Similarity3 turn;
-    turn.rotation = Eigen::AngleAxisd(std::numbers::pi, axes.eigenvectors().col(axis).normalized());
+    turn.rotation = Eigen::AngleAxisd(std::numbers::pi, axes.vectors.col(axis).normalized());
     turn.translation = target.center - turn.rotation * target.center;
     turns.push_back(turn);
   }

@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/units.h"
 #include "reconstruction/distance/triangle_bvh.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/registration/head_sheet.h"
 #include "reconstruction/registration/skull_fit_quality.h"
 
@@ -29,7 +30,7 @@ bool is_face(HeadRegion region) {
 
 void measure_head_fit(const HeadTemplate& head, const Points3& vertices, const TriangleMesh& scan,
                       const ScanPoints& points, int threads, FittedHead& fitted) {
-  const std::vector<bool> rim = rim_of(head);
+  const std::vector<bool> rim = boundary_vertices(head.triangles, head.vertices.rows());
   const HeadSheet sheet(head, vertices, rim);
   const auto count = static_cast<int>(points.points.size());
   std::vector<SheetHit> hits(static_cast<std::size_t>(count));

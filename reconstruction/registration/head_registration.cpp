@@ -5,11 +5,11 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <utility>
 
 #include "core/parallel.h"
 #include "core/units.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/registration/bending_energy.h"
 #include "reconstruction/registration/head_fit_quality.h"
 #include "reconstruction/registration/head_sheet.h"
@@ -49,8 +49,6 @@ constexpr double kTangentialShare = 0.15;
 constexpr double kLeastScale_mm = 0.3;
 constexpr int kChunk = 256;
 
-double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
 Result<ScanPoints> scan_points(const TriangleMesh& scan, const std::vector<double>& vertex_weight,
                                double spacing_mm) {
   auto points = oriented_samples(scan, spacing_mm);
@@ -71,7 +69,10 @@ class Fit {
  public:
   Fit(const HeadTemplate& head, Points3 start, const HeadRegistrationOptions& options,
       std::vector<InputLandmark> landmarks)
-      : head_(head), options_(options), rim_(rim_of(head)), vertices_(std::move(start)) {
+      : head_(head),
+        options_(options),
+        rim_(boundary_vertices(head.triangles, head.vertices.rows())),
+        vertices_(std::move(start)) {
     for (const InputLandmark& given : landmarks) {
       for (const TemplateLandmark& own : head.landmarks) {
         if (own.name == given.name) landmarks_.push_back({own.place, given.position_mm});

@@ -3,26 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <utility>
 
 namespace skullstation {
-
-std::vector<bool> rim_of(const HeadTemplate& head) {
-  std::map<std::pair<int, int>, int> edges;
-  for (Eigen::Index f = 0; f < head.triangles.rows(); ++f) {
-    for (int i = 0; i < 3; ++i) {
-      ++edges[std::minmax(int{head.triangles(f, i)}, int{head.triangles(f, (i + 1) % 3)})];
-    }
-  }
-  std::vector<bool> rim(static_cast<std::size_t>(head.vertices.rows()), false);
-  for (const auto& [edge, count] : edges) {
-    if (count != 1) continue;
-    rim[static_cast<std::size_t>(edge.first)] = true;
-    rim[static_cast<std::size_t>(edge.second)] = true;
-  }
-  return rim;
-}
 
 HeadSheet::HeadSheet(const HeadTemplate& head, const Points3& vertices,
                      const std::vector<bool>& rim)

@@ -18,13 +18,10 @@ struct SheetHit {
   bool beyond_edge = false;  ///< nearest to the sheet's end: the scan goes on where it doesn't
 };
 
-/// Vertices on the sheet's end, at the neck.
-std::vector<bool> rim_of(const HeadTemplate& head);
-
 /// The template's surface as it lies now, for searches.
 class HeadSheet {
  public:
-  /// `rim` is rim_of(head). Both must live on.
+  /// `rim`: which vertices are on the sheet's end, at the neck. Both must live on.
   HeadSheet(const HeadTemplate& head, const Points3& vertices, const std::vector<bool>& rim);
 
   SheetHit nearest(const Eigen::Vector3d& query) const;

@@ -2,11 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "core/units.h"
 
@@ -105,13 +106,12 @@ Result<PointFit> align_points(const OrientedPoints& source, const OrientedPoints
     }
     if (!options.estimate_scale) normal_matrix(6, 6) = normal_matrix.trace() / 6.0;
     if (count < 20) return fail(ErrorKind::no_result, "alignment", "the surfaces do not overlap");
-    const Eigen::SelfAdjointEigenSolver<Matrix7> spectrum(normal_matrix);
-    if (!(spectrum.eigenvalues()[0] > 1e-5 * spectrum.eigenvalues()[6])) {
+    const SymmetricSpectrum spectrum = symmetric_spectrum(normal_matrix);
+    if (!(spectrum.values[0] > 1e-5 * spectrum.values[6])) {
       return fail(ErrorKind::no_result, "alignment", "what overlaps slides freely");
     }
-    const Vector7 step = spectrum.eigenvectors() *
-                         spectrum.eigenvalues().cwiseInverse().asDiagonal() *
-                         spectrum.eigenvectors().transpose() * right_side;
+    const Vector7 step = spectrum.vectors * spectrum.values.cwiseInverse().asDiagonal() *
+                         spectrum.vectors.transpose() * right_side;
     Similarity3 motion;
     const double angle = step.head<3>().norm();
     if (angle > 0.0) motion.rotation = Eigen::AngleAxisd(angle, step.head<3>() / angle);

@@ -1,7 +1,9 @@
 #include "reconstruction/registration/similarity_fit.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace skullstation {
 
@@ -37,9 +39,7 @@ Result<Similarity3> fit_similarity(const Points3& source, const Points3& target,
     source_spread += weight(i) * p * p.transpose();
     target_squares += weight(i) * q.squaredNorm();
   }
-  const Eigen::Vector3d spread =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(source_spread, Eigen::EigenvaluesOnly)
-          .eigenvalues();
+  const Eigen::Vector3d spread = symmetric_spectrum(source_spread).values;
   if (!(spread[1] > 1e-12 * spread[2]) || !(target_squares > 0.0)) {
     return undetermined("the points lie on a line");
   }
@@ -51,12 +51,12 @@ Result<Similarity3> fit_similarity(const Points3& source, const Points3& target,
       m(0, 0) - m(1, 1) - m(2, 2), m(0, 1) + m(1, 0), m(2, 0) + m(0, 2), 0, 0,
       -m(0, 0) + m(1, 1) - m(2, 2), m(1, 2) + m(2, 1), 0, 0, 0, -m(0, 0) - m(1, 1) + m(2, 2);
   n.triangularView<Eigen::StrictlyLower>() = n.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> spectrum(n);
-  const Eigen::Vector4d q = spectrum.eigenvectors().col(3);
+  const SymmetricSpectrum spectrum = symmetric_spectrum(n);
+  const Eigen::Vector4d q = spectrum.vectors.col(3);
 
   Similarity3 fit;
   fit.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
-  if (scale == FitScale::to_target) fit.scale = spectrum.eigenvalues()[3] / source_spread.trace();
+  if (scale == FitScale::to_target) fit.scale = spectrum.values[3] / source_spread.trace();
   if (scale == FitScale::symmetric) fit.scale = std::sqrt(target_squares / source_spread.trace());
   if (!(fit.scale > 0.0)) return undetermined("the points do not correspond");
   fit.translation = target_center - fit.scale * (fit.rotation * source_center);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <optional>
 #include <utility>
 
@@ -61,8 +60,6 @@ constexpr double kLeastVolumeShare = 0.05;
 /// Of the paper's volume term, relative to a level's smoothness: chosen for the best fit on
 /// phantoms, see docs/registration.md.
 constexpr double kVolumePerSmooth = 1e-9;
-
-double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 /// A registration under way, in the template's frame.
 class Fit {

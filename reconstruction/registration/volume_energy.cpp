@@ -2,10 +2,10 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <vector>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 
 namespace skullstation {
@@ -66,12 +66,12 @@ Eigen::SparseMatrix<double> laplace_matrix(const Tetrahedra& tetrahedra, const P
 }
 
 Eigen::Matrix3d nearest_of_unit_determinant(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d given = svd.singularValues();
-  Eigen::Matrix3d u = svd.matrixU();
+  const SingularValues3 svd = singular_values(matrix);
+  const Eigen::Vector3d given = svd.values;
+  Eigen::Matrix3d u = svd.u;
   Eigen::Vector3d s = given;
   // A matrix that turns space inside out has its least direction turned back.
-  const bool turned = (u * svd.matrixV().transpose()).determinant() < 0.0;
+  const bool turned = (u * svd.v.transpose()).determinant() < 0.0;
   if (turned) {
     u.col(2) = -u.col(2);
     s[2] = -s[2];
@@ -85,7 +85,7 @@ Eigen::Matrix3d nearest_of_unit_determinant(const Eigen::Matrix3d& matrix) {
     offset = (gradient.dot(offset) - excess) / std::max(gradient.squaredNorm(), 1e-12) * gradient;
     s = start + offset;
   }
-  return u * s.asDiagonal() * svd.matrixV().transpose();
+  return u * s.asDiagonal() * svd.v.transpose();
 }
 
 Points3 volume_projection_pull(const Tetrahedra& tetrahedra, const Points3& rest,

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace skullstation {
 
@@ -18,10 +19,10 @@ tl::unexpected<Error> bad(const char* where, std::string what, std::string advic
 /// Columns made orthonormal in the plain inner product, with the same covariance `scaled scaled^T`:
 /// modes and variances of it, largest first.
 void orthonormalize(const Eigen::MatrixXd& scaled, ShapeModel& model) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> small(scaled.transpose() * scaled);
+  const SymmetricSpectrum small = symmetric_spectrum(scaled.transpose() * scaled);
   const Eigen::Index count = scaled.cols();
-  model.variances = small.eigenvalues().reverse();
-  model.modes = scaled * small.eigenvectors().rowwise().reverse();
+  model.variances = small.values.reverse();
+  model.modes = scaled * small.vectors.rowwise().reverse();
   for (Eigen::Index k = 0; k < count; ++k) {
     model.modes.col(k) /= std::sqrt(model.variances[k]);
     // The sign is free: the coordinate that moves most moves in the positive direction.
@@ -102,9 +103,9 @@ Result<ShapeModel> build_shape_model(std::span<const Points3> shapes,
     weights.segment<3>(3 * v).setConstant(vertex_weights[v] / vertex_weights.sum());
   }
   const Eigen::MatrixXd gram = centred.transpose() * weights.asDiagonal() * centred;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram);
+  const SymmetricSpectrum solver = symmetric_spectrum(gram);
   // Centring takes one dimension away.
-  const Eigen::VectorXd values = solver.eigenvalues().reverse().head(count - 1).cwiseMax(0.0);
+  const Eigen::VectorXd values = solver.values.reverse().head(count - 1).cwiseMax(0.0);
   const double total = values.sum();
   if (!(total > 0.0)) return bad("shape model", "all shapes are the same");
   Eigen::Index kept = 0;
@@ -114,7 +115,7 @@ Result<ShapeModel> build_shape_model(std::span<const Points3> shapes,
     explained += values[kept++];
   }
   // Regression of the coordinates on the subjects' scores: vertices of weight 0 go along.
-  const Eigen::MatrixXd scores = solver.eigenvectors().rowwise().reverse().leftCols(kept);
+  const Eigen::MatrixXd scores = solver.vectors.rowwise().reverse().leftCols(kept);
   const double degrees = static_cast<double>(count - 1);
   orthonormalize(centred * scores / std::sqrt(degrees), model);
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
@@ -12,6 +11,8 @@
 #include <limits>
 #include <memory>
 #include <span>
+
+#include "core/linear_algebra.h"
 
 namespace skullstation {
 
@@ -126,8 +127,8 @@ class Expectation {
       }
     }
     mean_ = smoothing_(medians);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(filled.transpose() * filled);
-    scores_ = gram.eigenvectors().rowwise().reverse().leftCols(modes).transpose() *
+    const SymmetricSpectrum gram = symmetric_spectrum(filled.transpose() * filled);
+    scores_ = gram.vectors.rowwise().reverse().leftCols(modes).transpose() *
               std::sqrt(static_cast<double>(subjects));
     seconds_.assign(static_cast<std::size_t>(subjects), {});
     for (Index n = 0; n < subjects; ++n) {
@@ -160,8 +161,8 @@ class Expectation {
     spread /= static_cast<double>(seconds_.size());
     const Eigen::MatrixXd scaled =
         modes_ * Eigen::LLT<Eigen::MatrixXd>(spread).matrixL().toDenseMatrix();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(scaled.transpose() * scaled);
-    Eigen::MatrixXd principal = scaled * axes.eigenvectors().rowwise().reverse();
+    const SymmetricSpectrum axes = symmetric_spectrum(scaled.transpose() * scaled);
+    Eigen::MatrixXd principal = scaled * axes.vectors.rowwise().reverse();
     for (Index k = 0; k < principal.cols(); ++k) {
       if (principal.col(k).sum() < 0.0) principal.col(k) = -principal.col(k);
     }

@@ -2,65 +2,50 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
-#include <unordered_map>
 #include <utility>
 
 #include "core/parallel.h"
 #include "core/units.h"
 #include "reconstruction/distance/triangle_bvh.h"
+#include "reconstruction/mesh/mesh_topology.h"
 
 namespace skullstation {
 
 namespace {
 
-/// Which edges of each triangle no other triangle shares.
+/// Where a mesh ends: a closest point there says nothing of the depth.
 class MeshBoundary {
  public:
   explicit MeshBoundary(const TriangleMesh& mesh)
-      : triangles_(mesh.triangles), on_boundary_(mesh.vertices.rows(), false) {
-    for (Eigen::Index t = 0; t < triangles_.rows(); ++t) {
-      for (int k = 0; k < 3; ++k) ++uses_[key(static_cast<int>(t), k)];
-    }
-    for (Eigen::Index t = 0; t < triangles_.rows(); ++t) {
-      for (int k = 0; k < 3; ++k) {
-        if (uses_.at(key(static_cast<int>(t), k)) != 1) continue;
-        on_boundary_[triangles_(t, k)] = true;
-        on_boundary_[triangles_(t, (k + 1) % 3)] = true;
-      }
-    }
-  }
+      : triangles_(mesh.triangles),
+        edges_(boundary_edges(mesh.triangles)),
+        vertices_(boundary_vertices(mesh.triangles, mesh.vertices.rows())) {}
 
   bool has(const ClosestPoint& point) const {
+    const int feature = static_cast<int>(point.feature);
     switch (point.feature) {
       case TriangleFeature::corner0:
       case TriangleFeature::corner1:
       case TriangleFeature::corner2:
-        return on_boundary_[triangles_(
-            point.triangle,
-            static_cast<int>(point.feature) - static_cast<int>(TriangleFeature::corner0))];
+        return vertices_[static_cast<std::size_t>(
+            triangles_(point.triangle, feature - static_cast<int>(TriangleFeature::corner0)))];
       case TriangleFeature::edge0:
       case TriangleFeature::edge1:
       case TriangleFeature::edge2:
-        return uses_.at(key(point.triangle, static_cast<int>(point.feature) -
-                                                static_cast<int>(TriangleFeature::edge0))) == 1;
+        return edges_[static_cast<std::size_t>(point.triangle)]
+                     [static_cast<std::size_t>(feature - static_cast<int>(TriangleFeature::edge0))];
       case TriangleFeature::face: return false;
     }
     return false;
   }
 
  private:
-  std::uint64_t key(int triangle, int edge) const {
-    const auto a = static_cast<std::uint32_t>(triangles_(triangle, edge));
-    const auto b = static_cast<std::uint32_t>(triangles_(triangle, (edge + 1) % 3));
-    return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
-  }
-
   Triangles triangles_;
-  std::unordered_map<std::uint64_t, int> uses_;
-  std::vector<bool> on_boundary_;
+  std::vector<std::array<bool, 3>> edges_;
+  std::vector<bool> vertices_;
 };
 
 tl::unexpected<Error> bad(std::string what) {

@@ -1,9 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <map>
-#include <utility>
 #include <vector>
 
 #include "reconstruction/mesh/mesh_topology.h"
@@ -113,21 +112,21 @@ TriangleMesh left_half(double face_edge_mm, int threads) {
 /// The half with all of its boundary but the neck's exactly in the midplane, or its mirror image
 /// would not meet it there; without the triangles that lie in that plane then.
 TriangleMesh closed_in_midplane(TriangleMesh half) {
-  std::map<std::pair<int, int>, int> uses;
-  for (Eigen::Index f = 0; f < half.triangles.rows(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = half.triangles(f, k);
-      const int b = half.triangles(f, (k + 1) % 3);
-      ++uses[{std::min(a, b), std::max(a, b)}];
-    }
-  }
   const auto in_neck = [&](int v) {
     return std::abs(half.vertices(v, 2) - kNeckZ_mm) < kInPlane_mm;
   };
-  for (const auto& [edge, count] : uses) {
-    if (count != 1 || (in_neck(edge.first) && in_neck(edge.second))) continue;
-    half.vertices(edge.first, 0) = 0.0;
-    half.vertices(edge.second, 0) = 0.0;
+  const std::vector<std::array<bool, 3>> boundary = boundary_edges(half.triangles);
+  for (Eigen::Index f = 0; f < half.triangles.rows(); ++f) {
+    for (int side = 0; side < 3; ++side) {
+      const int from = half.triangles(f, side);
+      const int to = half.triangles(f, (side + 1) % 3);
+      if (!boundary[static_cast<std::size_t>(f)][static_cast<std::size_t>(side)] ||
+          (in_neck(from) && in_neck(to))) {
+        continue;
+      }
+      half.vertices(from, 0) = 0.0;
+      half.vertices(to, 0) = 0.0;
+    }
   }
   return submesh(half, [&](Eigen::Index f) {
     return (half.vertices(half.triangles.row(f).transpose(), 0).array() != 0.0).any();

@@ -56,6 +56,7 @@ struct VolumeInfo {
   std::optional<double> slice_thickness_mm;
   std::string sex;  ///< "M", "F", "O" or empty
   std::optional<int> age_years;
+  std::optional<double> body_mass_index;  ///< no volume file tells it; the one who imports may
   std::optional<PatientIdentity> identity;
   /// What the reader had to correct or assume, a sentence each.
   std::vector<std::string> warnings;

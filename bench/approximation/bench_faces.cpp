@@ -1,0 +1,175 @@
+// How far approximated faces lie from the true ones: phantoms that the model never saw, each method
+// beside the others, as Markdown tables (docs/faces.md). Usage:
+//   bench_faces [--model FILE] [--people 20] [--seed 5000] [--remains complete|no-mandible|
+//               no-calvaria|half-face]
+// Depths are the model's population mean (the paper's method), foretold from the skull (the
+// default), the same with sex, age and body mass index known, and the person's own.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "bench/seconds.h"
+#include "core/random.h"
+#include "daemon/model/model_source.h"
+#include "reconstruction/approximation/face_error.h"
+#include "reconstruction/approximation/face_estimate.h"
+#include "reconstruction/mesh/mesh_topology.h"
+#include "reconstruction/phantom/person.h"
+#include "reconstruction/statistics/tissue_thickness.h"
+
+namespace skullstation {
+namespace {
+
+constexpr double edge_mm = 2.0;
+
+struct Options {
+  std::string model;
+  int people = 20;
+  std::uint64_t seed = 5000;
+  std::string remains = "complete";
+};
+
+Eigen::Vector3d landmark(const Person& person, std::string_view name) {
+  return person.bone.landmarks[landmark_index(person.bone.landmarks, name)].position_mm;
+}
+
+/// What is left of the person's skull.
+TriangleMesh remains_of(const Person& person, const std::string& remains) {
+  const TriangleMesh& skull = person.skull;
+  if (remains == "complete") return skull;
+  const double porion_y = landmark(person, "porion left").y();
+  const double calvaria_z = landmark(person, "glabella").z() + 15.0;
+  return submesh(skull, [&](Eigen::Index t) {
+    const Eigen::Vector3d center =
+        skull.vertices(skull.triangles.row(t), Eigen::all).colwise().mean().transpose();
+    if (remains == "no-mandible") return skull.triangles(t, 0) < person.cranium_vertices;
+    if (remains == "no-calvaria") return center.z() < calvaria_z;
+    const bool face = center.y() < porion_y && center.z() < calvaria_z;
+    return !(face && center.x() > 0.0);  // half-face: +x is the person's left
+  });
+}
+
+struct Method {
+  const char* name;
+  TissueChoice tissue;
+  bool facts;
+};
+constexpr Method methods[] = {{"mean depths (paper)", TissueChoice::population, false},
+                              {"given the skull (default)", TissueChoice::conditional, false},
+                              {"and sex, age, BMI", TissueChoice::conditional, true},
+                              {"the person's own depths", TissueChoice::measured, false}};
+
+PersonFacts facts_of(const Person& person) {
+  const PersonParameters& p = person.parameters;
+  return {p.sex == Sex::male ? 1.0 : 0.0, p.age_years, p.bmi};
+}
+
+/// The person's own depths over the fitted skull, which lies in `anatomical_from_person`.
+Result<Eigen::VectorXd> own_depths(const FaceModel& model, const CaseSkull& skull,
+                                   const TriangleMesh& skin) {
+  const SkullTemplate& t = model.skull_template;
+  std::vector<bool> outer(t.outer.begin(), t.outer.begin() + t.boundary_count);
+  auto depths =
+      tissue_thickness(surface_of(t, skull.vertices.topRows(t.boundary_count)), outer, skin, {});
+  if (!depths) return depths;
+  // Only where the model has depths: elsewhere the nearest skin says nothing of the tissue.
+  for (Eigen::Index v = 0; v < depths->size(); ++v) {
+    if (!model.tissue.modelled[static_cast<std::size_t>(v)]) {
+      (*depths)[v] = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  return depths;
+}
+
+TriangleMesh moved(const Similarity3& motion, TriangleMesh mesh) {
+  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
+    mesh.vertices.row(v) = (motion * mesh.vertices.row(v).transpose()).transpose();
+  }
+  return mesh;
+}
+
+Result<void> run(const Options& options) {
+  const auto source =
+      load_model(options.model.empty() ? std::optional<std::filesystem::path>() : options.model);
+  if (!source) return forward(source);
+  const FaceModel& model = source->model;
+  fmt::print("{} people, seed {}, skull {}; {}\n\n", options.people, options.seed, options.remains,
+             source->name);
+  fmt::print(
+      "| person | method | face mean mm | P95 | over bone mean | in 80 % band |\n"
+      "|---|---|---|---|---|---|\n");
+  const PersonMaker maker(edge_mm, 0);
+  std::map<std::string, std::vector<FaceError>> errors;
+  double fit_s = 0.0;
+  double face_s = 0.0;
+  for (int i = 0; i < options.people; ++i) {
+    const Person person =
+        maker.make(draw_person(mix(options.seed, static_cast<std::uint64_t>(i))), 0);
+    const Seconds begin = Seconds::now();
+    const auto skull = fit_case_skull(model, remains_of(person, options.remains));
+    fit_s += (Seconds::now() - begin).processor;
+    if (!skull) {
+      fmt::print("| {} | {} |\n", i + 1, skull.error().message());
+      continue;
+    }
+    const TriangleMesh skin = moved(skull->anatomical_from_input, person.skin);
+    for (const Method& method : methods) {
+      FaceOptions face_options;
+      face_options.tissue = method.tissue;
+      if (method.facts) face_options.facts = facts_of(person);
+      if (method.tissue == TissueChoice::measured) {
+        auto depths = own_depths(model, *skull, skin);
+        if (!depths) return forward(depths);
+        face_options.measured_mm = *std::move(depths);
+      }
+      const Seconds face_begin = Seconds::now();
+      const auto face = estimate_face(model, *skull, face_options);
+      if (!face) return forward(face);
+      face_s += (Seconds::now() - face_begin).processor;
+      const FaceError error = face_error(model.head_template, face->head, face->band_mm, skin, 0);
+      errors[method.name].push_back(error);
+      fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.0f} % |\n", i + 1, method.name,
+                 error.mean_mm, error.p95_mm, error.over_bone_mean_mm, 100.0 * error.within_band);
+    }
+    std::fflush(stdout);
+  }
+  for (const Method& method : methods) {
+    FaceError mean;
+    const auto& all = errors[method.name];
+    const auto count = static_cast<double>(all.size());
+    for (const FaceError& error : all) {
+      mean.mean_mm += error.mean_mm / count;
+      mean.p95_mm += error.p95_mm / count;
+      mean.over_bone_mean_mm += error.over_bone_mean_mm / count;
+      mean.within_band += error.within_band / count;
+    }
+    fmt::print("| mean | {} | {:.2f} | {:.2f} | {:.2f} | {:.0f} % |\n", method.name, mean.mean_mm,
+               mean.p95_mm, mean.over_bone_mean_mm, 100.0 * mean.within_band);
+  }
+  fmt::print("\nprocessor s: {:.1f} a skull, {:.1f} a face\n", fit_s / options.people,
+             face_s / options.people / std::size(methods));
+  return {};
+}
+
+}  // namespace
+}  // namespace skullstation
+
+int main(int argc, char** argv) {
+  skullstation::Options options;
+  CLI::App app("Error of approximated faces");
+  app.add_option("--model", options.model, "model file; without: the default model");
+  app.add_option("--people", options.people, "how many");
+  app.add_option("--seed", options.seed, "of the people");
+  app.add_option("--remains", options.remains, "what is left of the skulls")
+      ->check(CLI::IsMember({"complete", "no-mandible", "no-calvaria", "half-face"}));
+  CLI11_PARSE(app, argc, argv);
+  if (const auto done = skullstation::run(options); !done) {
+    fmt::print(stderr, "{}\n", done.error().message());
+    return skullstation::exit_code(done.error().kind);
+  }
+  return 0;
+}

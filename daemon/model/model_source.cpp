@@ -1,0 +1,37 @@
+#include "daemon/model/model_source.h"
+
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "core/file.h"
+#include "reconstruction/statistics/model_file.h"
+
+// default_model.S
+extern "C" const char skullstation_default_model[];
+extern "C" const char skullstation_default_model_end[];
+
+namespace skullstation {
+
+namespace {
+
+constexpr const char* default_name = "default model";
+
+std::string default_model() { return {skullstation_default_model, skullstation_default_model_end}; }
+
+}  // namespace
+
+Result<ModelSource> load_model(const std::optional<std::filesystem::path>& file) {
+  auto bytes = file ? read_file(*file) : Result<std::string>(default_model());
+  if (!bytes) return forward(bytes);
+  ModelSource source;
+  source.name = file ? file->filename().string() : default_name;
+  source.sha256 = sha256_hex(*bytes);
+  auto model = decode_model(*std::move(bytes), file ? file->string() : default_name);
+  if (!model) return forward(model);
+  source.model = *std::move(model);
+  const auto provenance = nlohmann::json::parse(source.model.provenance, nullptr, false);
+  if (provenance.is_object()) source.card = provenance.value("card", std::string());
+  return source;
+}
+
+}  // namespace skullstation

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/result.h"
+#include "reconstruction/statistics/face_model.h"
+
+namespace skullstation {
+
+/// A model and where it came from.
+struct ModelSource {
+  FaceModel model;
+  std::string name;  ///< of the file
+  std::string sha256;
+  std::string card;  ///< who it was made from, in plain words
+};
+
+/// The model in `file`, or without a file the one that is built into the program. Fails as
+/// read_file and decode_model do.
+Result<ModelSource> load_model(const std::optional<std::filesystem::path>& file);
+
+}  // namespace skullstation
