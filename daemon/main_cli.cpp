@@ -285,10 +285,11 @@ void add_commands(CLI::App& app, Command& chosen) {
         evaluate.add_option("--fits", o.fits, "folder that keeps finished fits")->required();
         evaluate.add_flag("--allow-failures", o.allow_failures, "leave out who can't be fitted");
       });
-  add<ModelInfoCommand>(*model, "info", "what a model file holds", chosen,
-                        [](CLI::App& info, ModelInfoCommand& o) {
-                          info.add_option("MODEL", o.model, "model file; without: the default model");
-                        });
+  add<ModelInfoCommand>(
+      *model, "info", "what a model file holds", chosen, [](CLI::App& info, ModelInfoCommand& o) {
+        info.add_option("MODEL", o.model, "model file; without: the default model");
+        info.add_option("--report", o.report, "HTML file with pictures of it");
+      });
 
   add<ApproximateCommand>(
       app, "approximate", "from a skull to a face with its variants and uncertainty", chosen,

@@ -133,7 +133,7 @@ std::vector<FaceVariant> face_variants(const FaceEstimate& face) {
 
 Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
                                const FaceEstimate& face, const CaseSource& source,
-                               const fs::path& folder, const FacePictureOptions& picture_options,
+                               const fs::path& folder, const ReportPictureOptions& picture_options,
                                const Progress& progress) {
   if (const auto free = check_new_folder(folder); !free) return free;
   StagedFolder staged(folder);

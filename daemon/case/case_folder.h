@@ -43,7 +43,7 @@ std::vector<FaceVariant> face_variants(const FaceEstimate& face);
 Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
                                const FaceEstimate& face, const CaseSource& source,
                                const std::filesystem::path& folder,
-                               const FacePictureOptions& picture_options,
+                               const ReportPictureOptions& picture_options,
                                const Progress& progress = {});
 
 }  // namespace skullstation

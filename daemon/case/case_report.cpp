@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "daemon/subject/html_report.h"
+#include "daemon/report/html_report.h"
 
 namespace skullstation {
 

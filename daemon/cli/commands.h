@@ -163,6 +163,7 @@ Result<CommandReport> run(const ModelEvaluateCommand&, const CommonOptions&, con
 
 struct ModelInfoCommand {
   std::optional<std::filesystem::path> model;  ///< else the default model
+  std::filesystem::path report;                ///< HTML file with pictures; empty: none
 };
 Result<CommandReport> run(const ModelInfoCommand&, const CommonOptions&, const Progress&);
 

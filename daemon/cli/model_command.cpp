@@ -7,6 +7,7 @@
 #include "core/file.h"
 #include "daemon/cli/commands.h"
 #include "daemon/model/fitted_subjects.h"
+#include "daemon/model/model_report.h"
 #include "daemon/model/model_source.h"
 #include "reconstruction/statistics/build_face_model.h"
 #include "reconstruction/statistics/model_file.h"
@@ -131,10 +132,20 @@ Result<CommandReport> run(const ModelBuildCommand& command, const CommonOptions&
   return report;
 }
 
-Result<CommandReport> run(const ModelInfoCommand& command, const CommonOptions&, const Progress&) {
+Result<CommandReport> run(const ModelInfoCommand& command, const CommonOptions& common,
+                          const Progress& progress) {
   const auto source = load_model(command.model);
   if (!source) return forward(source);
   const FaceModel& model = source->model;
+  if (!command.report.empty()) {
+    ReportPictureOptions pictures;
+    pictures.threads = common.threads;
+    const auto page = model_report(*source, pictures, progress);
+    if (!page) return forward(page);
+    if (const auto written = write_file_durably(command.report, *page); !written) {
+      return forward(written);
+    }
+  }
   CommandReport report;
   report.text = fmt::format(
       "{}\nsha256 {}\n{} subjects\nskull: {} vertices, {} modes\nhead: {} vertices, {} modes\n"

@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <string_view>
 
 #include "core/parallel.h"
-#include "reconstruction/rendering/picture_sheet.h"
 #include "reconstruction/volume/slice_picture.h"
 
 namespace skullstation {
@@ -39,24 +37,13 @@ constexpr std::array<PlannedSlice, 12> planned_slices = {{{"axial", 2, 0.08},
 
 Result<CaptionedPictures> surface_pictures(const TriangleMesh& mesh, const Eigen::Vector3d& color,
                                            int threads) {
-  std::vector<PictureSide> sides;
-  for (const PictureSide& side : head_sides()) {
-    const std::string_view name = side.name;
-    if (name == "front" || name == "left" || name == "back") sides.push_back(side);
-  }
   PicturedMesh pictured;
   pictured.mesh = &mesh;
   pictured.color = color;
-  PictureOptions options;
-  options.width = options.height = surface_picture_px;
-  options.samples = rays_per_pixel;
-  options.threads = threads;
-  auto drawn = render_sides({&pictured, 1}, sides, options);
-  if (!drawn) return forward(drawn);
   CaptionedPictures pictures;
-  for (std::size_t i = 0; i < sides.size(); ++i) {
-    pictures.emplace_back(sides[i].name, std::move((*drawn)[i]));
-  }
+  const auto done = add_sides(pictures, {&pictured, 1}, {"front", "left", "back"}, "",
+                              {surface_picture_px, rays_per_pixel, threads});
+  if (!done) return forward(done);
   return pictures;
 }
 

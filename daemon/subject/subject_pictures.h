@@ -1,16 +1,10 @@
 #pragma once
 
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "core/image.h"
 #include "core/result.h"
+#include "daemon/report/captioned_pictures.h"
 #include "reconstruction/volume/ct_surfaces.h"
 
 namespace skullstation {
-
-using CaptionedPictures = std::vector<std::pair<std::string, Image8>>;
 
 /// A surface from the front, the left and behind.
 Result<CaptionedPictures> surface_pictures(const TriangleMesh& mesh, const Eigen::Vector3d& color,

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "daemon/subject/html_report.h"
+#include "daemon/report/html_report.h"
 #include "daemon/subject/subject_pictures.h"
 #include "reconstruction/rendering/mesh_picture.h"
 

@@ -1,4 +1,4 @@
-#include "daemon/subject/html_report.h"
+#include "daemon/report/html_report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

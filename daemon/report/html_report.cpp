@@ -1,4 +1,4 @@
-#include "daemon/subject/html_report.h"
+#include "daemon/report/html_report.h"
 
 #include <fmt/format.h>
 
@@ -77,6 +77,41 @@ void HtmlReport::add_table(const std::vector<std::pair<std::string, std::string>
     body_ += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", escaped(what), escaped(value));
   }
   body_ += "</table>\n";
+}
+
+void HtmlReport::add_error_bars(const std::vector<ErrorBars>& rows, std::string_view unit,
+                                std::string_view ours, std::string_view reference) {
+  constexpr double left = 110.0, width = 560.0, row_height = 22.0, top = 26.0;
+  double most = 1.0;
+  for (const ErrorBars& row : rows) {
+    most = std::max({most, row.ours.mean + row.ours.sd, row.reference.mean + row.reference.sd});
+  }
+  const auto x_of = [&](double value) { return left + std::max(0.0, value) / most * width; };
+  const double height = top + row_height * static_cast<double>(rows.size()) + 20.0;
+  body_ += fmt::format(
+      "<svg viewBox=\"0 0 700 {:.0f}\" role=\"img\" style=\"max-width:900px;font-size:11px\">\n"
+      "<text x=\"{:.0f}\" y=\"12\">&#9679; {} &#160; &#9675; {} [{}]</text>\n",
+      height, left, escaped(ours), escaped(reference), escaped(unit));
+  for (double tick = 0.0; tick <= most; tick += 5.0) {
+    body_ += fmt::format(
+        "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.0f}\" y2=\"{2:.0f}\" stroke=\"#ddd\"/>"
+        "<text x=\"{0:.1f}\" y=\"{3:.0f}\" text-anchor=\"middle\">{4:.0f}</text>\n",
+        x_of(tick), top, height - 18.0, height - 6.0, tick);
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double y = top + row_height * (static_cast<double>(i) + 0.5);
+    body_ += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n",
+                         left - 8.0, y + 4.0, escaped(rows[i].name));
+    const auto add_bar = [&](const ErrorBars::Bar& bar, double at, const char* fill) {
+      body_ += fmt::format(
+          "<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#225\"/>"
+          "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\" stroke=\"#225\"/>\n",
+          x_of(bar.mean - bar.sd), x_of(bar.mean + bar.sd), at, at, x_of(bar.mean), at, fill);
+    };
+    add_bar(rows[i].ours, y - 4.0, "#225");
+    add_bar(rows[i].reference, y + 4.0, "#fff");
+  }
+  body_ += "</svg>\n";
 }
 
 void HtmlReport::add_pictures(const std::vector<std::pair<std::string, Image8>>& pictures) {

@@ -9,6 +9,17 @@
 
 namespace skullstation {
 
+/// A mean with its standard deviation, beside another.
+struct ErrorBars {
+  struct Bar {
+    double mean = 0.0;
+    double sd = 0.0;
+  };
+  std::string name;
+  Bar ours;
+  Bar reference;
+};
+
 /// An HTML page in one file, pictures and all, that any browser shows and prints without a network.
 /// Everything given is text: what HTML would take for its own is escaped.
 class HtmlReport {
@@ -21,6 +32,10 @@ class HtmlReport {
   void add_warning(std::string_view name, std::string_view text);
   /// Two columns: what, and its value.
   void add_table(const std::vector<std::pair<std::string, std::string>>& rows);
+  /// A chart with a row for each name: ours filled, the reference open, both with a line of one
+  /// standard deviation either way.
+  void add_error_bars(const std::vector<ErrorBars>& rows, std::string_view unit,
+                      std::string_view ours, std::string_view reference);
   /// Pictures in a row that breaks where the page ends, each with its caption.
   void add_pictures(const std::vector<std::pair<std::string, Image8>>& pictures);
 
