@@ -52,7 +52,8 @@ set(SKULLSTATION_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 # skullstation_test(NAME SOURCES a_test.cpp ... [LINK targets ...] [LABEL unit] [TIMEOUT s]
 #                   [ONE_PROCESS])
 # makes the test program NAME and registers each of its tests with CTest under the label, or with
-# ONE_PROCESS the program as a whole: for tests that share something dear to make.
+# ONE_PROCESS the program as a whole, labelled `dear`, too: for tests that share something dear to
+# make. Sanitizers run those only on request (docs/testing.md).
 function(skullstation_test name)
   cmake_parse_arguments(ARG "ONE_PROCESS" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
   if(NOT ARG_LABEL)
@@ -67,7 +68,7 @@ function(skullstation_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} skullstation::test_support GTest::gmock_main)
   if(ARG_ONE_PROCESS)
     add_test(NAME ${name} COMMAND ${name})
-    set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABEL};dear" TIMEOUT ${ARG_TIMEOUT})
   else()
     gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
       PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})

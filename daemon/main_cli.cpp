@@ -33,6 +33,8 @@ void add(CLI::App& parent, const std::string& name, const std::string& help, Com
 }
 
 constexpr const char* config_help = "station.toml; without it: a simulated station, all defaults";
+constexpr const char* template_help =
+    "file made by template build; without: the templates of the default model";
 
 void add_surface_options(CLI::App& app, CtSurfaceOptions& o) {
   app.add_option("--skin-hu", o.skin_hu, "threshold of the skin")->capture_default_str();
@@ -245,7 +247,7 @@ void add_commands(CLI::App& app, Command& chosen) {
       *fit, "skull", "the template skull on a skull, scanned or from CT", chosen,
       [](CLI::App& skull, FitSkullCommand& o) {
         skull.add_option("MESH", o.mesh, "PLY, OBJ or STL, in mm")->required();
-        skull.add_option("--template", o.templates, "file made by template build")->required();
+        skull.add_option("--template", o.templates, template_help);
         skull.add_option("--out", o.out, "folder")->required();
         skull.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
         skull.add_option("--regularizer", o.regularizer, "what keeps the template's shape")
@@ -254,14 +256,13 @@ void add_commands(CLI::App& app, Command& chosen) {
                 {"projected-volume", SkullRegularizer::projected_volume},
                 {"volume", SkullRegularizer::volume}}));
       });
-  add<FitHeadCommand>(
-      *fit, "head", "the template head on a skin surface", chosen,
-      [](CLI::App& head, FitHeadCommand& o) {
-        head.add_option("MESH", o.mesh, "PLY, OBJ or STL, in mm")->required();
-        head.add_option("--template", o.templates, "file made by template build")->required();
-        head.add_option("--out", o.out, "folder")->required();
-        head.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
-      });
+  add<FitHeadCommand>(*fit, "head", "the template head on a skin surface", chosen,
+                      [](CLI::App& head, FitHeadCommand& o) {
+                        head.add_option("MESH", o.mesh, "PLY, OBJ or STL, in mm")->required();
+                        head.add_option("--template", o.templates, template_help);
+                        head.add_option("--out", o.out, "folder")->required();
+                        head.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
+                      });
 
   CLI::App* model = app.add_subcommand("model", "statistical models of skull, tissue and head");
   model->require_subcommand(1);
@@ -269,7 +270,7 @@ void add_commands(CLI::App& app, Command& chosen) {
       *model, "build", "a model file from subject folders", chosen,
       [](CLI::App& build, ModelBuildCommand& o) {
         build.add_option("--subjects", o.subjects, "folder of subject folders")->required();
-        build.add_option("--template", o.templates, "file made by template build")->required();
+        build.add_option("--template", o.templates, template_help);
         build.add_option("--out", o.out, "model file (.h5)")->required();
         build.add_option("--fits", o.fits, "folder that keeps finished fits")->required();
         build.add_option("--card", o.card, "what the subjects are, in plain words")->required();
@@ -281,9 +282,18 @@ void add_commands(CLI::App& app, Command& chosen) {
       *model, "evaluate", "leave one subject out at a time: how good are the models?", chosen,
       [](CLI::App& evaluate, ModelEvaluateCommand& o) {
         evaluate.add_option("--subjects", o.subjects, "folder of subject folders")->required();
-        evaluate.add_option("--template", o.templates, "file made by template build")->required();
+        evaluate.add_option("--template", o.templates, template_help);
         evaluate.add_option("--fits", o.fits, "folder that keeps finished fits")->required();
         evaluate.add_flag("--allow-failures", o.allow_failures, "leave out who can't be fitted");
+      });
+  add<ModelImportHeadCommand>(
+      *model, "import-head", "take another head model in, e.g. one of real people", chosen,
+      [](CLI::App& import, ModelImportHeadCommand& o) {
+        import.add_option("FILE", o.head, "shape model in Statismo's layout (.h5)")->required();
+        import.add_option("--landmarks", o.landmarks,
+                          "JSON with \"indices\": vertices of the 68 Multi-PIE landmarks");
+        import.add_option("--model", o.model, "model to put it into; without: the default model");
+        import.add_option("--out", o.out, "model file (.h5)")->required();
       });
   add<ModelInfoCommand>(
       *model, "info", "what a model file holds", chosen, [](CLI::App& info, ModelInfoCommand& o) {
@@ -301,8 +311,12 @@ void add_commands(CLI::App& app, Command& chosen) {
             ->check(CLI::IsMember({"male", "female"}));
         approximate.add_option("--age", o.age_years, "years, if known");
         approximate.add_option("--bmi", o.body_mass_index, "body mass index, if known");
-        approximate.add_flag("--mean-tissue", o.mean_tissue,
-                             "the population's mean depths, as in the paper");
+        CLI::Option* tissue = approximate.add_option(
+            "--tissue", o.tissue, "CSV of depths known at landmarks: landmark,depth_mm[,sd_mm]");
+        approximate
+            .add_flag("--mean-tissue", o.mean_tissue,
+                      "the population's mean depths, as in the paper")
+            ->excludes(tissue);
         approximate.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
       });
 

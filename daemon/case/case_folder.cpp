@@ -10,6 +10,8 @@
 #include "core/session/image_file.h"
 #include "core/staged_folder.h"
 #include "daemon/case/case_report.h"
+#include "daemon/report/html_page.h"
+#include "daemon/report/pdf_document.h"
 #include "reconstruction/io/glb.h"
 #include "reconstruction/io/ply.h"
 
@@ -173,6 +175,10 @@ Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
     return fail(ErrorKind::cancelled, folder.string(), "was not written");
   }
 
+  const Report report = case_report(model, skull, face, source, pictures);
+  const auto pdf = pdf_document(report);
+  if (!pdf) return forward(pdf);
+
   progress.report(0.9, "writing the case");
   std::vector<MorphTarget> morphs;
   for (const FaceVariation& variation : face.variations) {
@@ -185,8 +191,8 @@ Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
         write_uncertainty(head, face, staged / "uncertainty.ply"),
         write_file_durably(staged / "tissue.csv", tissue_csv(model, face)),
         write_file_durably(staged / "case.json", case_json(model, skull, face, source)),
-        write_file_durably(staged / "report.html",
-                           case_report(model, skull, face, source, pictures))}) {
+        write_file_durably(staged / "report.html", html_page(report)),
+        write_file_durably(staged / "report.pdf", *pdf)}) {
     if (!written) return written;
   }
   for (const auto& [name, picture] : pictures.face) {

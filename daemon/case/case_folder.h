@@ -37,9 +37,9 @@ std::vector<FaceVariant> face_variants(const FaceEstimate& face);
 
 /// Writes a case: skull_fitted.ply, head.ply, head.glb (variations as morph targets), variants/,
 /// spheres.ply, uncertainty.ply (sd_mm, band80_mm, from_bone for each vertex), tissue.csv,
-/// case.json, report.html, preview_*.png. The folder appears whole or not at all. The same bytes
-/// for any number of threads. Fails with `usage` where the folder is there already, `cancelled` on
-/// request.
+/// case.json, report.html, report.pdf, preview_*.png. The folder appears whole or not at all. The
+/// same bytes for any number of threads. Fails with `usage` where the folder is there already,
+/// `cancelled` on request.
 Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
                                const FaceEstimate& face, const CaseSource& source,
                                const std::filesystem::path& folder,

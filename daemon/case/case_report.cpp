@@ -4,8 +4,6 @@
 
 #include <cmath>
 
-#include "daemon/report/html_report.h"
-
 namespace skullstation {
 
 namespace {
@@ -58,36 +56,37 @@ std::vector<LandmarkDepth> landmark_depths(const FaceModel& model, const FaceEst
   return depths;
 }
 
-std::string case_report(const FaceModel& model, const CaseSkull& skull, const FaceEstimate& face,
-                        const CaseSource& source, const CasePictures& pictures) {
-  HtmlReport report("Facial approximation");
-  report.add_paragraph(
+Report case_report(const FaceModel& model, const CaseSkull& skull, const FaceEstimate& face,
+                   const CaseSource& source, const CasePictures& pictures) {
+  Report report{"Facial approximation", {}};
+  report.add(Paragraph{
       "A facial approximation is an investigative aid, not an identification. It shows one face "
       "out "
       "of many that the skull allows. Hair, eyes, skin colour and expression are not known and are "
-      "not shown; nose, lips, eyes and ears follow from bone only in part.");
-  for (const std::string& warning : skull.warnings) report.add_warning("warning", warning);
-  report.add_warning("model", source.model_card);
-  report.add_pictures(pictures.face);
+      "not shown; nose, lips, eyes and ears follow from bone only in part."});
+  for (const std::string& warning : skull.warnings) report.add(Warning{"warning", warning});
+  for (const std::string& warning : face.warnings) report.add(Warning{"warning", warning});
+  report.add(Warning{"model", source.model_card});
+  report.add(Pictures{pictures.face});
 
-  report.add_heading("How far it may be off");
-  report.add_paragraph(fmt::format(
+  report.add(Heading{"How far it may be off"});
+  report.add(Paragraph{fmt::format(
       "Over bone, eight faces in ten of people with such a skull lie within {:.1f} mm of this one, "
       "on average over the face. Colours: half width of that band from 0 (dark) to 8 mm (yellow). "
       "Grey: not determined by the bone below; the model's guess.",
-      mean_band_mm(face)));
-  report.add_pictures(pictures.uncertainty);
+      mean_band_mm(face))});
+  report.add(Pictures{pictures.uncertainty});
 
-  report.add_heading("Faces that are as plausible");
-  report.add_paragraph(
+  report.add(Heading{"Faces that are as plausible"});
+  report.add(Paragraph{
       "Two standard deviations along the ways in which the soft tissue of the model's subjects "
       "differs most, and leaner and fuller where the body mass index is not known. Show them "
-      "together: whoever knew the person may recognise one and not another.");
-  report.add_pictures(pictures.variants);
+      "together: whoever knew the person may recognise one and not another."});
+  report.add(Pictures{pictures.variants});
 
-  report.add_heading("How it was made");
-  report.add_pictures(pictures.method);
-  report.add_table({
+  report.add(Heading{"How it was made"});
+  report.add(Pictures{pictures.method});
+  report.add(Table{{
       {"known besides the skull", facts_in_words(source.facts)},
       {"skull's face to the fitted template",
        fmt::format("mean {:.2f} mm, 95 % within {:.2f} mm", skull.quality.facial.mean_mm,
@@ -100,9 +99,9 @@ std::string case_report(const FaceModel& model, const CaseSkull& skull, const Fa
       {"model",
        fmt::format("{} subjects, {} skull, {} tissue and {} head modes", model.joint.subjects,
                    model.skull.mode_count(), model.tissue.mode_count(), model.head.mode_count())},
-  });
+  }});
 
-  report.add_heading("Soft tissue at the landmarks");
+  report.add(Heading{"Soft tissue at the landmarks"});
   std::vector<std::pair<std::string, std::string>> rows;
   for (const LandmarkDepth& depth : landmark_depths(model, face)) {
     rows.emplace_back(
@@ -110,10 +109,10 @@ std::string case_report(const FaceModel& model, const CaseSkull& skull, const Fa
         fmt::format("{:.1f} +- {:.1f} mm (model: {:.1f} +- {:.1f} mm, n = {})", depth.depth_mm,
                     depth.sd_mm, depth.model_mean_mm, depth.model_sd_mm, depth.subjects));
   }
-  report.add_table(rows);
+  report.add(Table{rows});
 
-  report.add_heading("To make it again");
-  report.add_table({{"skull", source.input},
+  report.add(Heading{"To make it again"});
+  report.add(Table{{{"skull", source.input},
                     {"its SHA-256", source.input_sha256},
                     {"model", source.model},
                     {"its SHA-256", source.model_sha256},
@@ -121,8 +120,8 @@ std::string case_report(const FaceModel& model, const CaseSkull& skull, const Fa
                     {"seed", std::to_string(source.seed)},
                     {"method",
                      "Gietzen et al. 2019 (statistical skull model, dense soft tissue thickness, "
-                     "statistical head model), with the joint model of skull, tissue and head"}});
-  return report.page();
+                     "statistical head model), with the joint model of skull, tissue and head"}}});
+  return report;
 }
 
 }  // namespace skullstation

@@ -5,6 +5,7 @@
 #include "core/result.h"
 #include "daemon/case/case_folder.h"
 #include "daemon/case/face_pictures.h"
+#include "daemon/report/report.h"
 
 namespace skullstation {
 
@@ -13,10 +14,10 @@ struct CasePictures {
   CaptionedPictures face, method, uncertainty, variants;
 };
 
-/// report.html: the face and what to think of it in plain words first, then variants, uncertainty,
+/// The face and what to think of it in plain words first, then variants, uncertainty,
 /// how it was made, landmarks, and all that is needed to make it again.
-std::string case_report(const FaceModel& model, const CaseSkull& skull, const FaceEstimate& face,
-                        const CaseSource& source, const CasePictures& pictures);
+Report case_report(const FaceModel& model, const CaseSkull& skull, const FaceEstimate& face,
+                   const CaseSource& source, const CasePictures& pictures);
 
 /// A landmark's depth, where the skull template has the landmark.
 struct LandmarkDepth {

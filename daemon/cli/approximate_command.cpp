@@ -5,6 +5,7 @@
 #include "core/file.h"
 #include "core/staged_folder.h"
 #include "daemon/case/case_folder.h"
+#include "daemon/case/known_depths.h"
 #include "daemon/cli/commands.h"
 #include "daemon/model/model_source.h"
 #include "reconstruction/io/mesh_file.h"
@@ -39,6 +40,12 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   source.facts = options.facts;
   source.seed = common.seed;
 
+  if (!command.tissue.empty()) {
+    auto depths = read_known_depths(command.tissue, model.skull_template);
+    if (!depths) return forward(depths);
+    options.known_depths = *std::move(depths);
+  }
+
   SkullRegistrationOptions fit_options;
   fit_options.unit_unknown = command.unit_unknown;
   fit_options.seed = common.seed;
@@ -54,21 +61,24 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   }
 
   CommandReport report;
-  for (const std::string& warning : skull->warnings) report.text += "warning: " + warning + "\n";
+  std::vector<std::string> warnings = skull->warnings;
+  warnings.insert(warnings.end(), face->warnings.begin(), face->warnings.end());
+  for (const std::string& warning : warnings) report.text += "warning: " + warning + "\n";
   report.text += fmt::format(
       "{}\n  skull to template: mean {:.2f} mm, P95 {:.2f} mm; {:.0f} % observed\n"
       "  face: +- {:.1f} mm (80 % band, mean over the head)\n  look at it: {}\n",
       command.out.string(), skull->quality.facial.mean_mm, skull->quality.facial.p95_mm,
       100.0 * skull->quality.observed_share, face->band_mm.mean(),
       (command.out / "report.html").string());
-  report.json = nlohmann::ordered_json{{"case", command.out.string()},
-                                       {"facial_mean_mm", skull->quality.facial.mean_mm},
-                                       {"facial_p95_mm", skull->quality.facial.p95_mm},
-                                       {"observed_share", skull->quality.observed_share},
-                                       {"strangeness_sd", skull->strangeness},
-                                       {"mean_band80_mm", face->band_mm.mean()},
-                                       {"warnings", skull->warnings}}
-                    .dump(2);
+  report.json = nlohmann::ordered_json{
+      {"case", command.out.string()},
+      {"facial_mean_mm", skull->quality.facial.mean_mm},
+      {"facial_p95_mm", skull->quality.facial.p95_mm},
+      {"observed_share", skull->quality.observed_share},
+      {"strangeness_sd", skull->strangeness},
+      {"mean_band80_mm", face->band_mm.mean()},
+      {"warnings",
+       warnings}}.dump(2);
   return report;
 }
 

@@ -122,7 +122,7 @@ Result<CommandReport> run(const TemplateBuildCommand&, const CommonOptions&, con
 /// Deforms the template skull onto a surface: skull_fitted.ply and fit.json in `out`.
 struct FitSkullCommand {
   std::filesystem::path mesh;
-  std::filesystem::path templates;
+  std::optional<std::filesystem::path> templates;  ///< else those of the default model
   std::filesystem::path out;
   SkullRegularizer regularizer = SkullRegularizer::smooth;
   bool unit_unknown = false;
@@ -132,7 +132,7 @@ Result<CommandReport> run(const FitSkullCommand&, const CommonOptions&, const Pr
 /// Deforms the template head onto a surface: head_fitted.ply and fit.json in `out`.
 struct FitHeadCommand {
   std::filesystem::path mesh;
-  std::filesystem::path templates;
+  std::optional<std::filesystem::path> templates;  ///< else those of the default model
   std::filesystem::path out;
   bool unit_unknown = false;
 };
@@ -141,7 +141,7 @@ Result<CommandReport> run(const FitHeadCommand&, const CommonOptions&, const Pro
 /// Fits the templates to every subject folder and makes a model file of them.
 struct ModelBuildCommand {
   std::filesystem::path subjects;
-  std::filesystem::path templates;
+  std::optional<std::filesystem::path> templates;  ///< else those of the default model
   std::filesystem::path out;
   std::filesystem::path fits;  ///< keeps finished fits between runs
   std::string card;            ///< what the subjects are, in plain words
@@ -155,7 +155,7 @@ Result<CommandReport> run(const ModelBuildCommand&, const CommonOptions&, const 
 /// specificity.
 struct ModelEvaluateCommand {
   std::filesystem::path subjects;
-  std::filesystem::path templates;
+  std::optional<std::filesystem::path> templates;  ///< else those of the default model
   std::filesystem::path fits;
   bool allow_failures = false;
 };
@@ -167,6 +167,15 @@ struct ModelInfoCommand {
 };
 Result<CommandReport> run(const ModelInfoCommand&, const CommonOptions&, const Progress&);
 
+/// Another head model for a model: skull and tissue stay, nothing is known of how they go together.
+struct ModelImportHeadCommand {
+  std::filesystem::path head;                  ///< Statismo file
+  std::filesystem::path landmarks;             ///< empty: the pose is found
+  std::optional<std::filesystem::path> model;  ///< else the default model
+  std::filesystem::path out;
+};
+Result<CommandReport> run(const ModelImportHeadCommand&, const CommonOptions&, const Progress&);
+
 /// From bone to face: a case folder with the face, its variants, uncertainty and report.
 struct ApproximateCommand {
   std::filesystem::path skull;
@@ -175,7 +184,8 @@ struct ApproximateCommand {
   std::optional<std::string> sex;  ///< "male" or "female"
   std::optional<double> age_years;
   std::optional<double> body_mass_index;
-  bool mean_tissue = false;  ///< the paper's way: the population's mean depths
+  std::filesystem::path tissue;  ///< CSV of depths known at landmarks; empty: none
+  bool mean_tissue = false;      ///< the paper's way: the population's mean depths
   bool unit_unknown = false;
 };
 Result<CommandReport> run(const ApproximateCommand&, const CommonOptions&, const Progress&);

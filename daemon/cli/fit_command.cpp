@@ -4,16 +4,20 @@
 
 #include "core/file.h"
 #include "daemon/cli/commands.h"
+#include "daemon/model/model_source.h"
 #include "reconstruction/io/mesh_file.h"
 #include "reconstruction/registration/head_registration.h"
 #include "reconstruction/registration/skull_registration.h"
-#include "reconstruction/templates/template_file.h"
 
 namespace skullstation {
 
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+std::string name_of(const std::optional<std::filesystem::path>& templates) {
+  return templates ? templates->string() : "default model";
+}
 
 Json json_of(const FitDistances& distances) {
   return {{"points", distances.points},
@@ -85,7 +89,7 @@ Result<void> write_fit(const TriangleMesh& mesh, const std::string& name, const 
 
 Result<CommandReport> run(const FitSkullCommand& command, const CommonOptions& common,
                           const Progress& progress) {
-  const auto templates = read_templates(command.templates);
+  const auto templates = load_templates(command.templates);
   if (!templates) return forward(templates);
   const auto input = read_mesh(command.mesh);
   if (!input) return forward(input);
@@ -101,7 +105,7 @@ Result<CommandReport> run(const FitSkullCommand& command, const CommonOptions& c
   const Json json = {{"format", "skullstation-fit/1"},
                      {"kind", "skull"},
                      {"input", command.mesh.string()},
-                     {"templates", command.templates.string()},
+                     {"templates", name_of(command.templates)},
                      {"input_from_template", matrix_rows(fit->input_from_template.matrix())},
                      {"facial", json_of(quality.facial)},
                      {"outer", json_of(quality.outer)},
@@ -132,7 +136,7 @@ Result<CommandReport> run(const FitSkullCommand& command, const CommonOptions& c
 
 Result<CommandReport> run(const FitHeadCommand& command, const CommonOptions& common,
                           const Progress& progress) {
-  const auto templates = read_templates(command.templates);
+  const auto templates = load_templates(command.templates);
   if (!templates) return forward(templates);
   const auto input = read_mesh(command.mesh);
   if (!input) return forward(input);
@@ -147,7 +151,7 @@ Result<CommandReport> run(const FitHeadCommand& command, const CommonOptions& co
   const Json json = {{"format", "skullstation-fit/1"},
                      {"kind", "head"},
                      {"input", command.mesh.string()},
-                     {"templates", command.templates.string()},
+                     {"templates", name_of(command.templates)},
                      {"input_from_template", matrix_rows(fit->input_from_template.matrix())},
                      {"weighted_rms_mm", quality.weighted_rms_mm},
                      {"kept_share", quality.kept_share},

@@ -9,10 +9,11 @@
 #include "daemon/model/fitted_subjects.h"
 #include "daemon/model/model_report.h"
 #include "daemon/model/model_source.h"
+#include "daemon/report/html_page.h"
 #include "reconstruction/statistics/build_face_model.h"
+#include "reconstruction/statistics/head_import.h"
 #include "reconstruction/statistics/model_file.h"
 #include "reconstruction/statistics/model_quality.h"
-#include "reconstruction/templates/template_file.h"
 
 namespace skullstation {
 
@@ -78,6 +79,21 @@ double wilcoxon_p(std::vector<double> differences) {
   return std::erfc(std::abs(z) / std::sqrt(2.0));
 }
 
+Result<std::vector<VertexLandmark>> read_multi_pie(const std::filesystem::path& file) {
+  const auto text = read_file(file);
+  if (!text) return forward(text);
+  const auto json = Json::parse(*text, nullptr, false);
+  std::vector<int> vertices;
+  if (json.is_object() && json.contains("indices") && json["indices"].is_array()) {
+    for (const auto& index : json["indices"]) {
+      if (index.is_number_integer()) vertices.push_back(index.get<int>());
+    }
+  }
+  auto landmarks = multi_pie_landmarks(vertices);
+  if (!landmarks) landmarks.error().where = file.string();
+  return landmarks;
+}
+
 struct Prediction {
   const char* name;
   double mean_mm = 0.0;
@@ -88,7 +104,7 @@ struct Prediction {
 
 Result<CommandReport> run(const ModelBuildCommand& command, const CommonOptions& common,
                           const Progress& progress) {
-  const auto templates = read_templates(command.templates);
+  const auto templates = load_templates(command.templates);
   if (!templates) return forward(templates);
   const auto fits =
       fit_subjects(command.subjects, templates->skull, templates->head,
@@ -142,7 +158,7 @@ Result<CommandReport> run(const ModelInfoCommand& command, const CommonOptions& 
     pictures.threads = common.threads;
     const auto page = model_report(*source, pictures, progress);
     if (!page) return forward(page);
-    if (const auto written = write_file_durably(command.report, *page); !written) {
+    if (const auto written = write_file_durably(command.report, html_page(*page)); !written) {
       return forward(written);
     }
   }
@@ -171,9 +187,57 @@ Result<CommandReport> run(const ModelInfoCommand& command, const CommonOptions& 
   return report;
 }
 
+Result<CommandReport> run(const ModelImportHeadCommand& command, const CommonOptions& common,
+                          const Progress& progress) {
+  auto bytes = read_file(command.head);
+  if (!bytes) return forward(bytes);
+  const std::string hash = sha256_hex(*bytes);
+  const auto foreign = decode_statismo(*std::move(bytes), command.head.string());
+  if (!foreign) return forward(foreign);
+  HeadImportOptions options;
+  options.seed = common.seed;
+  options.threads = common.threads;
+  if (!command.landmarks.empty()) {
+    auto landmarks = read_multi_pie(command.landmarks);
+    if (!landmarks) return forward(landmarks);
+    options.landmarks = *std::move(landmarks);
+  }
+  auto base = load_model(command.model);
+  if (!base) return forward(base);
+  auto imported = import_head(base->model, *foreign, options, progress);
+  if (!imported) return forward(imported);
+  const HeadFitQuality& fit = imported->fit;
+  FaceModel model = with_head(std::move(base->model), std::move(imported->model));
+  Json provenance = Json::parse(model.provenance, nullptr, false);
+  if (!provenance.is_object()) provenance = Json::object();
+  provenance["card"] =
+      fmt::format("{} Its heads are those of {}, which nothing ties to its skulls.", base->card,
+                  command.head.filename().string());
+  provenance["head"] = {{"file", command.head.filename().string()}, {"sha256", hash}};
+  model.provenance = provenance.dump();
+  const auto encoded = encode_model(model);
+  if (!encoded) return forward(encoded);
+  if (const auto written = write_file_durably(command.out, *encoded); !written) {
+    return forward(written);
+  }
+  CommandReport report;
+  for (const std::string& warning : imported->warnings) report.text += "warning: " + warning + "\n";
+  report.text += fmt::format(
+      "{}: {} head modes; template to the foreign mean: face RMS {:.2f} mm, P95 {:.2f} mm, {:.0f} "
+      "% "
+      "of its points kept\n",
+      command.out.string(), model.head.mode_count(), fit.facial.rms_mm, fit.facial.p95_mm,
+      100.0 * fit.kept_share);
+  report.json = Json{{"model", command.out.string()},         {"sha256", sha256_hex(*encoded)},
+                     {"head_modes", model.head.mode_count()}, {"facial_rms_mm", fit.facial.rms_mm},
+                     {"kept_share", fit.kept_share},          {"warnings", imported->warnings}}
+                    .dump(2);
+  return report;
+}
+
 Result<CommandReport> run(const ModelEvaluateCommand& command, const CommonOptions& common,
                           const Progress& progress) {
-  const auto templates = read_templates(command.templates);
+  const auto templates = load_templates(command.templates);
   if (!templates) return forward(templates);
   const auto fits =
       fit_subjects(command.subjects, templates->skull, templates->head,

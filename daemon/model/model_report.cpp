@@ -6,7 +6,6 @@
 #include <cmath>
 #include <functional>
 
-#include "daemon/report/html_report.h"
 #include "reconstruction/phantom/thickness_table.h"
 
 namespace skullstation {
@@ -78,8 +77,8 @@ Result<CaptionedPictures> tissue_pictures(const FaceModel& model,
   return pictures;
 }
 
-std::vector<ErrorBars> depths_beside_t_table(const FaceModel& model) {
-  std::vector<ErrorBars> rows;
+std::vector<ErrorBars::Row> depths_beside_t_table(const FaceModel& model) {
+  std::vector<ErrorBars::Row> rows;
   for (const TissueThickness& entry : thickness_table()) {
     for (const SkinDirection& direction : model.skin_directions) {
       const std::string bone(entry.bone);
@@ -94,19 +93,19 @@ std::vector<ErrorBars> depths_beside_t_table(const FaceModel& model) {
 
 }  // namespace
 
-Result<std::string> model_report(const ModelSource& source, const ReportPictureOptions& options,
-                                 const Progress& progress) {
+Result<Report> model_report(const ModelSource& source, const ReportPictureOptions& options,
+                            const Progress& progress) {
   const FaceModel& model = source.model;
-  HtmlReport report("Statistical model of skull, soft tissue and head");
-  report.add_warning("who", source.card);
+  Report report{"Statistical model of skull, soft tissue and head", {}};
+  report.add(Warning{"who", source.card});
 
   progress.report(0.0, "skulls");
   const auto skulls = variants(
       model.skull, [&](const Points3& v) { return surface_of(model.skull_template, v); },
       PicturedMesh{}.color, options);
   if (!skulls) return forward(skulls);
-  report.add_heading("Skulls along the first two modes");
-  report.add_pictures(*skulls);
+  report.add(Heading{"Skulls along the first two modes"});
+  report.add(Pictures{*skulls});
   if (progress.stop.stop_requested()) return fail(ErrorKind::cancelled, "report", "stopped");
 
   progress.report(0.3, "heads");
@@ -114,26 +113,26 @@ Result<std::string> model_report(const ModelSource& source, const ReportPictureO
       model.head, [&](const Points3& v) { return surface_of(model.head_template, v); }, skin_color,
       options);
   if (!heads) return forward(heads);
-  report.add_heading("Heads along the first two modes");
-  report.add_pictures(*heads);
+  report.add(Heading{"Heads along the first two modes"});
+  report.add(Pictures{*heads});
   if (progress.stop.stop_requested()) return fail(ErrorKind::cancelled, "report", "stopped");
 
   progress.report(0.6, "soft tissue");
   const auto tissue = tissue_pictures(model, options);
   if (!tissue) return forward(tissue);
-  report.add_heading("Soft tissue thickness over the mean skull");
-  report.add_paragraph(
+  report.add(Heading{"Soft tissue thickness over the mean skull"});
+  report.add(Paragraph{
       "The distance from each place of the bone to the nearest skin. Grey: too few subjects, or "
-      "the inside of the skull, where the nearest skin says nothing.");
-  report.add_pictures(*tissue);
+      "the inside of the skull, where the nearest skin says nothing."});
+  report.add(Pictures{*tissue});
 
-  report.add_heading("At the landmarks");
-  report.add_paragraph(
+  report.add(Heading{"At the landmarks"});
+  report.add(Paragraph{
       "Mean and standard deviation from bone landmark to skin landmark: the model's subjects "
-      "(filled) beside the T-Table of Hona and Stephan 2024 (open).");
-  report.add_error_bars(depths_beside_t_table(model), "mm", "model", "T-Table");
+      "(filled) beside the T-Table of Hona and Stephan 2024 (open)."});
+  report.add(ErrorBars{depths_beside_t_table(model), "mm", "model", "T-Table"});
 
-  report.add_heading("Figures");
+  report.add(Heading{"Figures"});
   std::vector<std::pair<std::string, std::string>> rows = {
       {"file", source.name},
       {"SHA-256", source.sha256},
@@ -149,8 +148,8 @@ Result<std::string> model_report(const ModelSource& source, const ReportPictureO
     rows.emplace_back(fmt::format("{:.0f} % band, {}", 100.0 * band.level, band.region),
                       fmt::format("{:.2f} standard deviations", band.factor));
   }
-  report.add_table(rows);
-  return report.page();
+  report.add(Table{rows});
+  return report;
 }
 
 }  // namespace skullstation

@@ -1,7 +1,7 @@
 #include "daemon/model/model_source.h"
 
 #include <nlohmann/json.hpp>
-#include <string_view>
+#include <utility>
 
 #include "core/file.h"
 #include "reconstruction/statistics/model_file.h"
@@ -32,6 +32,13 @@ Result<ModelSource> load_model(const std::optional<std::filesystem::path>& file)
   const auto provenance = nlohmann::json::parse(source.model.provenance, nullptr, false);
   if (provenance.is_object()) source.card = provenance.value("card", std::string());
   return source;
+}
+
+Result<Templates> load_templates(const std::optional<std::filesystem::path>& file) {
+  if (file) return read_templates(*file);
+  auto source = load_model(std::nullopt);
+  if (!source) return forward(source);
+  return Templates{std::move(source->model.skull_template), std::move(source->model.head_template)};
 }
 
 }  // namespace skullstation

@@ -6,6 +6,7 @@
 
 #include "core/result.h"
 #include "reconstruction/statistics/face_model.h"
+#include "reconstruction/templates/template_file.h"
 
 namespace skullstation {
 
@@ -20,5 +21,9 @@ struct ModelSource {
 /// The model in `file`, or without a file the one that is built into the program. Fails as
 /// read_file and decode_model do.
 Result<ModelSource> load_model(const std::optional<std::filesystem::path>& file);
+
+/// The templates in `file`, which `template build` made, or without a file those of the default
+/// model.
+Result<Templates> load_templates(const std::optional<std::filesystem::path>& file);
 
 }  // namespace skullstation

@@ -5,17 +5,13 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
-#include "core/image.h"
 #include "core/result.h"
 #include "core/triangle_mesh.h"
+#include "daemon/report/report.h"
 #include "reconstruction/rendering/mesh_picture.h"
 
 namespace skullstation {
-
-using CaptionedPictures = std::vector<std::pair<std::string, Image8>>;
 
 struct ReportPictureOptions {
   int width_px = 420;  ///< and height

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "daemon/report/html_report.h"
+#include "daemon/report/html_page.h"
 #include "daemon/subject/subject_pictures.h"
 #include "reconstruction/rendering/mesh_picture.h"
 
@@ -21,27 +21,27 @@ std::string in_words(const std::optional<double>& value, const char* format, con
   return value ? fmt::format(fmt::runtime(format), *value) : nothing;
 }
 
-void add_findings(HtmlReport& report, const CtSurfaces& surfaces, const SubjectSource& source) {
-  report.add_heading("Is the scan fit for model generation?");
+void add_findings(Report& report, const CtSurfaces& surfaces, const SubjectSource& source) {
+  report.add(Heading{"Is the scan fit for model generation?"});
   const auto& findings = surfaces.quality.findings;
-  if (findings.empty()) report.add_paragraph("Nothing was found that speaks against it.");
+  if (findings.empty()) report.add(Paragraph{"Nothing was found that speaks against it."});
   for (const CtFinding& finding : findings) {
-    report.add_warning(to_string(finding.warning), finding.text);
+    report.add(Warning{to_string(finding.warning), finding.text});
   }
   for (const std::string& correction : source.info.warnings) {
-    report.add_warning("while reading", correction);
+    report.add(Warning{"while reading", correction});
   }
-  report.add_paragraph(fmt::format(
+  report.add(Paragraph{fmt::format(
       "Thin bone: walls thinner than about two voxels (orbital floor and medial wall, ethmoid, "
       "nasal conchae, parts of the maxillary sinus) do not reach {} HU. They are open or too thin "
       "in the bone surface, which has {} such openings; measure nothing there.",
-      source.options.bone_hu, surfaces.quality.skull_openings));
+      source.options.bone_hu, surfaces.quality.skull_openings)});
 }
 
-void add_figures(HtmlReport& report, const CtSurfaces& surfaces) {
+void add_figures(Report& report, const CtSurfaces& surfaces) {
   const CtQuality& q = surfaces.quality;
-  report.add_heading("Figures");
-  report.add_table(
+  report.add(Heading{"Figures"});
+  report.add(Table{
       {{"skull", surface_in_words(surfaces.skull, q.skull_components, q.skull_closed_manifold)},
        {"skin", surface_in_words(surfaces.skin, q.skin_components, q.skin_closed_manifold)},
        {"bone parts", fmt::format("{} kept{}, {} removed", q.bone_parts_kept,
@@ -52,14 +52,14 @@ void add_figures(HtmlReport& report, const CtSurfaces& surfaces) {
         fmt::format("{:.0f} ml", q.surroundings_removed_mm3 / 1000.0)},
        {"they touched the head on", fmt::format("{:.0f} mm^2 in front, {:.0f} mm^2 behind",
                                                 q.contact_front_mm2, q.contact_back_mm2)},
-       {"cropped at", in_words(q.crop_z_mm, "z = {:.1f} mm", "not cropped")}});
+       {"cropped at", in_words(q.crop_z_mm, "z = {:.1f} mm", "not cropped")}}});
 }
 
-void add_source(HtmlReport& report, const SubjectSource& source) {
+void add_source(Report& report, const SubjectSource& source) {
   const VolumeInfo& info = source.info;
   const CtSurfaceOptions& o = source.options;
   const auto known = [](const std::string& text) { return text.empty() ? "not stated" : text; };
-  report.add_heading("Scan and options");
+  report.add(Heading{"Scan and options"});
   std::vector<std::pair<std::string, std::string>> rows = {
       {"scan", fmt::format("{}, {} x {} x {} voxels of {:.3f} x {:.3f} x {:.3f} mm", info.format,
                            source.grid.size.x(), source.grid.size.y(), source.grid.size.z(),
@@ -80,7 +80,7 @@ void add_source(HtmlReport& report, const SubjectSource& source) {
     rows.insert(rows.begin(), {"patient (identity kept on request)",
                                fmt::format("{}, {}", info.identity->name, info.identity->id)});
   }
-  report.add_table(rows);
+  report.add(Table{rows});
 }
 
 }  // namespace
@@ -91,20 +91,20 @@ Result<std::string> subject_report(const CtSurfaces& surfaces, const SubjectSour
   if (!skull) return forward(skull);
   const auto skin = surface_pictures(surfaces.skin, skin_color, threads);
   if (!skin) return forward(skin);
-  HtmlReport report("Bone and skin from CT");
+  Report report{"Bone and skin from CT", {}};
   add_findings(report, surfaces, source);
-  report.add_heading("Skull");
-  report.add_pictures(*skull);
-  report.add_heading("Skin");
-  report.add_pictures(*skin);
-  report.add_heading("Slices: orange the bone surface, blue the skin surface");
-  report.add_paragraph(
+  report.add(Heading{"Skull"});
+  report.add(Pictures{*skull});
+  report.add(Heading{"Skin"});
+  report.add(Pictures{*skin});
+  report.add(Heading{"Slices: orange the bone surface, blue the skin surface"});
+  report.add(Paragraph{
       "Axial slices are seen from the feet, coronal ones from the front: the patient's left is on "
-      "the right. Slices are counted from the feet, from the front and from the right.");
-  report.add_pictures(slice_pictures(surfaces, threads));
+      "the right. Slices are counted from the feet, from the front and from the right."});
+  report.add(Pictures{slice_pictures(surfaces, threads)});
   add_figures(report, surfaces);
   add_source(report, source);
-  return report.page();
+  return html_page(report);
 }
 
 }  // namespace skullstation

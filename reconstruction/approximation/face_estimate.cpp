@@ -54,6 +54,30 @@ HeadAndTissue jointly(const FaceModel& model, const Belief& belief) {
   return {belief_about(model.joint, belief, names), model.head.mode_count()};
 }
 
+/// What is believed once depths are known. Logarithms of depths are linear in the tissue's
+/// coefficients, so that this is a Gaussian's update; a depth where nothing is modelled tells
+/// nothing.
+HeadAndTissue updated(const TissueModel& tissue, HeadAndTissue state,
+                      const std::vector<KnownDepth>& depths) {
+  for (const KnownDepth& known : depths) {
+    Index corner = 0;
+    known.bone.weights.maxCoeff(&corner);
+    const Index v = known.bone.corners[corner];
+    if (!tissue.modelled[static_cast<std::size_t>(v)]) continue;
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(state.both.mean.size());
+    row.tail(tissue.mode_count()) = tissue.modes.row(v);
+    const double log_sd = known.sd_mm / known.depth_mm;
+    const Eigen::VectorXd gain_of = state.both.covariance * row;
+    const double variance =
+        row.dot(gain_of) + log_sd * log_sd + tissue.noise_sd[v] * tissue.noise_sd[v];
+    const double surprise =
+        std::log(known.depth_mm) - tissue.log_mean[v] - row.dot(state.both.mean);
+    state.both.mean += gain_of * (surprise / variance);
+    state.both.covariance -= gain_of * gain_of.transpose() / variance;
+  }
+  return state;
+}
+
 /// Depths over the bone as the head's fit sees them.
 struct Depths {
   Eigen::VectorXd mm;      ///< skull surface vertices; NaN: no sphere
@@ -156,6 +180,13 @@ Result<void> FaceOptions::validate() const {
   if (const auto sound = facts.validate(); !sound) return sound;
   if (const auto sound = spheres.validate(); !sound) return sound;
   if (rounds < 1) return fail(ErrorKind::bad_input, "face, rounds", "must be at least 1");
+  for (const KnownDepth& known : known_depths) {
+    if (!(known.depth_mm > 0.0) || !(known.depth_mm < 80.0) || !(known.sd_mm > 0.0)) {
+      return fail(
+          ErrorKind::bad_input, "known depth",
+          fmt::format("{} mm +- {} mm is no depth of soft tissue", known.depth_mm, known.sd_mm));
+    }
+  }
   return {};
 }
 
@@ -177,7 +208,7 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
   Depths depths;
   switch (options.tissue) {
     case TissueChoice::conditional: {
-      prior = jointly(model, belief);
+      prior = updated(model.tissue, jointly(model, belief), options.known_depths);
       const Belief tissue = prior.tissue();
       face.tissue_mm = expected_tissue(model.tissue, tissue);
       face.tissue_sd_mm = tissue_sd_mm(model.tissue, tissue);
@@ -234,6 +265,11 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
     const HeadRegion region = model.head_template.region[static_cast<std::size_t>(v)];
     face.band_mm[v] = factor_of(model.bands, to_string(region)) * face.sd_mm[v];
     face.from_bone.push_back(rests_on_bone(region));
+  }
+  if (!model.joint.index_of("head 1")) {
+    face.warnings.emplace_back(
+        "The model's heads are of other people than its skulls: nose, lips, eyes and ears do not "
+        "follow from the skull, only from the soft tissue around them.");
   }
   for (const std::string& name : coefficient_names("tissue", model.tissue.mode_count())) {
     if (model.joint.index_of(name)) {

@@ -18,10 +18,20 @@ enum class TissueChoice {
   measured      ///< the subject's own, for tests of the method
 };
 
+/// A depth of the soft tissue that is known from elsewhere: a table, an ultrasound, a needle.
+struct KnownDepth {
+  SurfacePoint bone;  ///< on the skull template's surface
+  double depth_mm = 0.0;
+  double sd_mm = 1.0;
+};
+
 struct FaceOptions {
   TissueChoice tissue = TissueChoice::conditional;
   Eigen::VectorXd measured_mm;  ///< skull surface vertices, NaN: unknown; for `measured`
   PersonFacts facts;
+  /// For `conditional`: what the model foretells is bent to agree with them, as far as they are
+  /// certain.
+  std::vector<KnownDepth> known_depths;
   SphereModelOptions spheres;
   int rounds = 6;   ///< of correspondences between head and sphere model
   int threads = 0;  ///< 0: all
@@ -48,6 +58,7 @@ struct FaceEstimate {
   std::vector<bool> from_bone;  ///< head vertices whose depth over bone carries them; the others
                                 ///< (nose, lips, eyes, ears) follow from the model alone
   std::vector<FaceVariation> variations;
+  std::vector<std::string> warnings;
 };
 
 /// The face over a case's skull (Gietzen et al. 2019; the joint model of docs/faces.md). Fails

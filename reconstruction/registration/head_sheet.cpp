@@ -13,21 +13,12 @@ HeadSheet::HeadSheet(const HeadTemplate& head, const Points3& vertices,
 SheetHit HeadSheet::nearest(const Eigen::Vector3d& query) const {
   const ClosestPoint closest = bvh_.closest(query);
   SheetHit hit;
-  hit.place.corners = mesh_.triangles.row(closest.triangle);
+  hit.place = surface_point(mesh_, closest.triangle, closest.point);
   const auto corner = [&](int i) -> Eigen::Vector3d {
     return mesh_.vertices.row(hit.place.corners[i]);
   };
-  const Eigen::Vector3d ab = corner(1) - corner(0);
-  const Eigen::Vector3d ac = corner(2) - corner(0);
-  const Eigen::Vector3d ap = closest.point - corner(0);
-  const Eigen::Vector3d normal = ab.cross(ac);
-  const double squared = normal.squaredNorm();
-  if (squared > 0.0) {
-    const double v = ap.cross(ac).dot(normal) / squared;
-    const double w = ab.cross(ap).dot(normal) / squared;
-    hit.place.weights = {1.0 - v - w, v, w};
-    hit.normal = normal / std::sqrt(squared);
-  }
+  const Eigen::Vector3d normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+  if (normal.squaredNorm() > 0.0) hit.normal = normal.normalized();
   hit.point = closest.point;
   hit.distance_mm = closest.distance_mm;
   for (int i = 0; i < 3; ++i) {

@@ -20,6 +20,9 @@ struct SurfacePoint {
   }
 };
 
+/// The place of `point`, which lies on that triangle.
+SurfacePoint surface_point(const TriangleMesh& mesh, int triangle, const Eigen::Vector3d& point);
+
 /// A landmark of a template, on its surface. Bilateral ones end in " left" or " right" (the
 /// person's own), as in landmarks.json.
 struct TemplateLandmark {

@@ -34,6 +34,15 @@ void orthonormalize(const Eigen::MatrixXd& scaled, ShapeModel& model) {
 
 }  // namespace
 
+ShapeModel shape_model_of(const Eigen::VectorXd& mean, const Eigen::MatrixXd& scaled_modes,
+                          double noise_variance) {
+  ShapeModel model;
+  model.mean = mean;
+  model.noise_variance = noise_variance;
+  orthonormalize(scaled_modes, model);
+  return model;
+}
+
 Eigen::MatrixXd ShapeModel::scaled_modes() const {
   return modes * variances.cwiseSqrt().asDiagonal();
 }

@@ -28,6 +28,11 @@ struct ShapeModel {
   Result<void> validate() const;
 };
 
+/// The model whose shapes are the mean plus `scaled_modes` (3 #V x #modes [mm]) times standard
+/// normal coefficients; its modes are made orthonormal.
+ShapeModel shape_model_of(const Eigen::VectorXd& mean, const Eigen::MatrixXd& scaled_modes,
+                          double noise_variance);
+
 /// #V x 3 as one vector x0 y0 z0 x1 ... and back.
 Eigen::VectorXd flattened(const Points3& vertices);
 Points3 unflattened(const Eigen::VectorXd& coordinates);

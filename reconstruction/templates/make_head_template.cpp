@@ -11,7 +11,7 @@
 #include "reconstruction/templates/head_regions.h"
 #include "reconstruction/templates/make_templates.h"
 #include "reconstruction/templates/remeshing.h"
-#include "reconstruction/templates/surface_places.h"
+#include "reconstruction/registration/surface_places.h"
 
 namespace skullstation {
 

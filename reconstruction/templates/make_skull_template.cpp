@@ -14,7 +14,7 @@
 #include "reconstruction/templates/make_templates.h"
 #include "reconstruction/templates/outside.h"
 #include "reconstruction/templates/skull_regions.h"
-#include "reconstruction/templates/surface_places.h"
+#include "reconstruction/registration/surface_places.h"
 #include "reconstruction/templates/tetrahedralization.h"
 
 namespace skullstation {

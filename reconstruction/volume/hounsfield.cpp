@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
+#include <vector>
 
 namespace skullstation {
 
@@ -12,6 +13,7 @@ namespace {
 
 constexpr int air_hu = -1000;
 constexpr int tolerance_hu = 60;
+constexpr int padding_gap_hu = 200;
 
 void shift(Volume& volume, int offset) {
   for (std::int16_t& hu : volume.hu) {
@@ -21,27 +23,45 @@ void shift(Volume& volume, int offset) {
   }
 }
 
+constexpr int lowest_hu = std::numeric_limits<std::int16_t>::min();
+constexpr int bin_hu = 4;
+using Histogram = std::vector<std::size_t>;
+
+/// The highest peak from which tissue is 900 to 1300 HU away.
+std::optional<int> peak_below_tissue(const Histogram& histogram, std::size_t voxels) {
+  std::optional<std::size_t> best;
+  for (std::size_t air = 0; air + 1300 / bin_hu < histogram.size(); ++air) {
+    if (histogram[air] < voxels / 50) continue;
+    std::size_t tissue = 0;
+    for (std::size_t t = air + 900 / bin_hu; t < air + 1300 / bin_hu; ++t) tissue += histogram[t];
+    if (tissue < voxels / 50) continue;
+    if (!best || histogram[air] > histogram[*best]) best = air;
+  }
+  if (!best) return std::nullopt;
+  return lowest_hu + static_cast<int>(*best) * bin_hu + bin_hu / 2;
+}
+
+/// Without the padding outside the scanner's round field, which is one value far below all others.
+Histogram without_padding(Histogram histogram) {
+  const auto filled = [](std::size_t count) { return count > 0; };
+  const auto first = std::ranges::find_if(histogram, filled);
+  if (first == histogram.end()) return histogram;
+  const auto second = std::find_if(first + 1, histogram.end(), filled);
+  if (second - first > padding_gap_hu / bin_hu) *first = 0;
+  return histogram;
+}
+
 }  // namespace
 
 std::optional<int> air_peak(const Volume& volume) {
-  constexpr int lowest = std::numeric_limits<std::int16_t>::min();
-  constexpr int bin = 4;
-  std::vector<std::size_t> histogram(65536 / bin, 0);
+  Histogram histogram(65536 / bin_hu, 0);
   for (const std::int16_t hu : volume.hu) {
-    ++histogram[static_cast<std::size_t>((hu - lowest) / bin)];
+    ++histogram[static_cast<std::size_t>((hu - lowest_hu) / bin_hu)];
   }
-  // Padding outside the scanner's round field lies far below air, at one value: the peak that
-  // counts is the highest one from which tissue is 800 to 1300 HU away.
-  std::size_t best = histogram.size();
-  for (std::size_t air = 0; air + 1300 / bin < histogram.size(); ++air) {
-    if (histogram[air] < volume.hu.size() / 50) continue;
-    std::size_t tissue = 0;
-    for (std::size_t t = air + 900 / bin; t < air + 1300 / bin; ++t) tissue += histogram[t];
-    if (tissue < volume.hu.size() / 50) continue;
-    if (best == histogram.size() || histogram[air] > histogram[best]) best = air;
-  }
-  if (best == histogram.size()) return std::nullopt;
-  return lowest + static_cast<int>(best) * bin + bin / 2;
+  // Air stands to padding as tissue stands to air. Where nothing is air once padding is gone, what
+  // looked like padding was air without noise.
+  const auto peak = peak_below_tissue(without_padding(histogram), volume.hu.size());
+  return peak ? peak : peak_below_tissue(histogram, volume.hu.size());
 }
 
 Result<void> apply_hu_offset(Volume& volume, const VolumeReadOptions& options,

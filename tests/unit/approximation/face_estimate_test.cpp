@@ -123,6 +123,30 @@ TEST(FaceEstimate, VariationsPointTheWayTheFactsGo) {
   EXPECT_EQ(face.variations.size(), static_cast<std::size_t>(model().tissue.mode_count()) + 1);
 }
 
+TEST(FaceEstimate, FollowsDepthsThatAreKnown) {
+  const CaseSkull skull = case_of(everybody()[training]);
+  const FaceEstimate before =
+      estimate_face(model(), skull, coarse(TissueChoice::conditional)).value();
+  const Index at = 10;
+  FaceOptions options = coarse(TissueChoice::conditional);
+  KnownDepth known;
+  known.bone.corners.setConstant(at);
+  known.depth_mm = before.tissue_mm[at] + 3.0;
+  known.sd_mm = 0.2;
+  options.known_depths = {known};
+  const FaceEstimate after = estimate_face(model(), skull, options).value();
+  EXPECT_NEAR(after.tissue_mm[at], known.depth_mm, 0.4);
+  // A ball's tissue is as thick everywhere: the other side follows, and so does the head.
+  EXPECT_NEAR(after.tissue_mm.mean() - before.tissue_mm.mean(), 3.0, 0.6);
+  const double grown = (after.head.rowwise().norm() - before.head.rowwise().norm()).mean();
+  EXPECT_NEAR(grown, 3.0, 0.8);
+  EXPECT_LT(after.tissue_sd_mm[at], before.tissue_sd_mm[at]);
+
+  options.known_depths.front().depth_mm = -2.0;
+  EXPECT_THAT(estimate_face(model(), skull, options).error().message(),
+              ::testing::HasSubstr("no depth of soft tissue"));
+}
+
 TEST(FaceEstimate, WhatBoneDoesNotTellIsMarked) {
   const FaceEstimate face =
       estimate_face(model(), case_of(everybody()[training]), coarse(TissueChoice::population))

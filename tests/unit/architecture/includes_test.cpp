@@ -59,7 +59,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
       "reconstruction/volume", "daemon/report"}},
     {"daemon/model",
      {"core", "reconstruction/io", "reconstruction/phantom", "reconstruction/registration",
-      "reconstruction/statistics", "daemon/report"}},
+      "reconstruction/statistics", "reconstruction/templates", "daemon/report"}},
     {"daemon/case",
      {"core", "core/session", "reconstruction/io", "reconstruction/rendering",
       "reconstruction/registration", "reconstruction/statistics", "reconstruction/approximation",
@@ -91,7 +91,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
 /// Headers that take seconds to compile: for their own folder only, behind our own plain types.
 const std::vector<std::string> heavy = {
     "CGAL/", "ceres/",     "opencv2/", "embree3/", "itk",          "gdcm",      "boost/", "exiv2/",
-    "gpiod", "libcamera/", "toml",     "CLI/",     "Eigen/Sparse", "nanoflann", "hdf5"};
+    "gpiod", "libcamera/", "toml",     "CLI/",     "Eigen/Sparse", "nanoflann", "hdf5", "hpdf"};
 
 struct Include {
   fs::path file;

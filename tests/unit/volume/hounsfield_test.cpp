@@ -24,6 +24,9 @@ TEST(Hounsfield, TheAirPeakIsFound) {
   Volume padded = head(0);
   for (std::size_t i = 0; i < padded.hu.size() / 10; ++i) padded.hu[i] = -3024;
   EXPECT_NEAR(*air_peak(padded), -1000, 4);
+  // Air stands to padding of -2000 as tissue stands to air.
+  for (std::size_t i = 0; i < padded.hu.size() / 2; ++i) padded.hu[i] = -2000;
+  EXPECT_NEAR(*air_peak(padded), -1000, 4);
   Volume water = head(0);
   std::ranges::fill(water.hu, std::int16_t{0});
   EXPECT_FALSE(air_peak(water));

@@ -1,4 +1,4 @@
-#include "daemon/report/html_report.h"
+#include "daemon/report/html_page.h"
 
 #include <fmt/format.h>
 
@@ -37,6 +37,73 @@ std::string escaped(std::string_view text) {
   return result;
 }
 
+std::string html_of(const Heading& heading) {
+  return fmt::format("<h2>{}</h2>\n", escaped(heading.text));
+}
+
+std::string html_of(const Paragraph& paragraph) {
+  return fmt::format("<p>{}</p>\n", escaped(paragraph.text));
+}
+
+std::string html_of(const Warning& warning) {
+  return fmt::format("<p class=\"warning\"><b>{}</b>: {}</p>\n", escaped(warning.name),
+                     escaped(warning.text));
+}
+
+std::string html_of(const Table& table) {
+  std::string html = "<table>\n";
+  for (const auto& [what, value] : table.rows) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", escaped(what), escaped(value));
+  }
+  return html + "</table>\n";
+}
+
+std::string html_of(const Pictures& pictures) {
+  std::string html = "<div class=\"pictures\">\n";
+  for (const auto& [caption, picture] : pictures.pictures) {
+    html += fmt::format(
+        "<figure><img alt=\"{0}\" src=\"data:image/jpeg;base64,{1}\">"
+        "<figcaption>{0}</figcaption></figure>\n",
+        escaped(caption), base64(encode_jpeg(picture, jpeg_quality)));
+  }
+  return html + "</div>\n";
+}
+
+std::string html_of(const ErrorBars& chart) {
+  std::string html;
+  constexpr double left = 110.0, width = 560.0, row_height = 22.0, top = 26.0;
+  double most = 1.0;
+  for (const ErrorBars::Row& row : chart.rows) {
+    most = std::max({most, row.ours.mean + row.ours.sd, row.reference.mean + row.reference.sd});
+  }
+  const auto x_of = [&](double value) { return left + std::max(0.0, value) / most * width; };
+  const double height = top + row_height * static_cast<double>(chart.rows.size()) + 20.0;
+  html += fmt::format(
+      "<svg viewBox=\"0 0 700 {:.0f}\" role=\"img\" style=\"max-width:900px;font-size:11px\">\n"
+      "<text x=\"{:.0f}\" y=\"12\">&#9679; {} &#160; &#9675; {} [{}]</text>\n",
+      height, left, escaped(chart.ours), escaped(chart.reference), escaped(chart.unit));
+  for (double tick = 0.0; tick <= most; tick += 5.0) {
+    html += fmt::format(
+        "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.0f}\" y2=\"{2:.0f}\" stroke=\"#ddd\"/>"
+        "<text x=\"{0:.1f}\" y=\"{3:.0f}\" text-anchor=\"middle\">{4:.0f}</text>\n",
+        x_of(tick), top, height - 18.0, height - 6.0, tick);
+  }
+  for (std::size_t i = 0; i < chart.rows.size(); ++i) {
+    const double y = top + row_height * (static_cast<double>(i) + 0.5);
+    html += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n",
+                        left - 8.0, y + 4.0, escaped(chart.rows[i].name));
+    const auto add_bar = [&](const ErrorBars::Bar& bar, double at, const char* fill) {
+      html += fmt::format(
+          "<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#225\"/>"
+          "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\" stroke=\"#225\"/>\n",
+          x_of(bar.mean - bar.sd), x_of(bar.mean + bar.sd), at, at, x_of(bar.mean), at, fill);
+    };
+    add_bar(chart.rows[i].ours, y - 4.0, "#225");
+    add_bar(chart.rows[i].reference, y + 4.0, "#fff");
+  }
+  return html + "</svg>\n";
+}
+
 }  // namespace
 
 std::string base64(std::string_view bytes) {
@@ -57,80 +124,16 @@ std::string base64(std::string_view bytes) {
   return text;
 }
 
-HtmlReport::HtmlReport(std::string_view title) : title_(escaped(title)) {}
-
-void HtmlReport::add_heading(std::string_view text) {
-  body_ += fmt::format("<h2>{}</h2>\n", escaped(text));
-}
-
-void HtmlReport::add_paragraph(std::string_view text) {
-  body_ += fmt::format("<p>{}</p>\n", escaped(text));
-}
-
-void HtmlReport::add_warning(std::string_view name, std::string_view text) {
-  body_ += fmt::format("<p class=\"warning\"><b>{}</b>: {}</p>\n", escaped(name), escaped(text));
-}
-
-void HtmlReport::add_table(const std::vector<std::pair<std::string, std::string>>& rows) {
-  body_ += "<table>\n";
-  for (const auto& [what, value] : rows) {
-    body_ += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", escaped(what), escaped(value));
+std::string html_page(const Report& report) {
+  std::string body;
+  for (const ReportBlock& block : report.blocks) {
+    body += std::visit([](const auto& b) { return html_of(b); }, block);
   }
-  body_ += "</table>\n";
-}
-
-void HtmlReport::add_error_bars(const std::vector<ErrorBars>& rows, std::string_view unit,
-                                std::string_view ours, std::string_view reference) {
-  constexpr double left = 110.0, width = 560.0, row_height = 22.0, top = 26.0;
-  double most = 1.0;
-  for (const ErrorBars& row : rows) {
-    most = std::max({most, row.ours.mean + row.ours.sd, row.reference.mean + row.reference.sd});
-  }
-  const auto x_of = [&](double value) { return left + std::max(0.0, value) / most * width; };
-  const double height = top + row_height * static_cast<double>(rows.size()) + 20.0;
-  body_ += fmt::format(
-      "<svg viewBox=\"0 0 700 {:.0f}\" role=\"img\" style=\"max-width:900px;font-size:11px\">\n"
-      "<text x=\"{:.0f}\" y=\"12\">&#9679; {} &#160; &#9675; {} [{}]</text>\n",
-      height, left, escaped(ours), escaped(reference), escaped(unit));
-  for (double tick = 0.0; tick <= most; tick += 5.0) {
-    body_ += fmt::format(
-        "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.0f}\" y2=\"{2:.0f}\" stroke=\"#ddd\"/>"
-        "<text x=\"{0:.1f}\" y=\"{3:.0f}\" text-anchor=\"middle\">{4:.0f}</text>\n",
-        x_of(tick), top, height - 18.0, height - 6.0, tick);
-  }
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const double y = top + row_height * (static_cast<double>(i) + 0.5);
-    body_ += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n",
-                         left - 8.0, y + 4.0, escaped(rows[i].name));
-    const auto add_bar = [&](const ErrorBars::Bar& bar, double at, const char* fill) {
-      body_ += fmt::format(
-          "<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#225\"/>"
-          "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\" stroke=\"#225\"/>\n",
-          x_of(bar.mean - bar.sd), x_of(bar.mean + bar.sd), at, at, x_of(bar.mean), at, fill);
-    };
-    add_bar(rows[i].ours, y - 4.0, "#225");
-    add_bar(rows[i].reference, y + 4.0, "#fff");
-  }
-  body_ += "</svg>\n";
-}
-
-void HtmlReport::add_pictures(const std::vector<std::pair<std::string, Image8>>& pictures) {
-  body_ += "<div class=\"pictures\">\n";
-  for (const auto& [caption, picture] : pictures) {
-    body_ += fmt::format(
-        "<figure><img alt=\"{0}\" src=\"data:image/jpeg;base64,{1}\">"
-        "<figcaption>{0}</figcaption></figure>\n",
-        escaped(caption), base64(encode_jpeg(picture, jpeg_quality)));
-  }
-  body_ += "</div>\n";
-}
-
-std::string HtmlReport::page() const {
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width\"><title>{0}</title>"
       "<style>{1}</style></head>\n<body>\n<h1>{0}</h1>\n{2}</body></html>\n",
-      title_, style, body_);
+      escaped(report.title), style, body);
 }
 
 }  // namespace skullstation
