@@ -62,10 +62,9 @@ Vector3d to_board(const PlacedScene& scene, const Vector3d& x_table) {
 void hit_board(const PlacedScene& scene, const SightRay& ray, SurfacePoint& nearest) {
   const SceneOptions& options = scene.parts->options;
   const Eigen::Vector2d half = half_plate(options);
-  const Rigid3 board_from_table = scene.table_from_board.inverse();
-  const Vector3d direction = board_from_table.rotation * ray.direction;
+  const Vector3d direction = scene.board_rotation_table * ray.direction;
   const auto hit =
-      enter_box(board_from_table * ray.origin, direction,
+      enter_box(to_board(scene, ray.origin), direction,
                 {-half.x(), -half.y(), -options.board_thickness_mm}, {half.x(), half.y(), 0.0});
   if (!hit || hit->distance_mm >= nearest.distance_mm) return;
   Vector3d normal = Vector3d::Zero();
