@@ -1,7 +1,8 @@
 // Do many synthetic people have the measures of mankind? Makes N people, measures their skulls and
 // the tissue at their landmarks and prints, as Markdown tables, the share of a standard deviation
-// by which the mean of each measure is off, the ratio of its standard deviation to the table's, how
-// far the craniometric correlations are off, and how near the skin comes to the bone.
+// by which the mean of each measure is off, the ratio of its standard deviation to the table's
+// (both of the people and of the parameters that were drawn for them, which tells chance from
+// bias), how far the craniometric correlations are off, and how near the skin comes to the bone.
 // Usage: bench_population [N = 200] [seed = 1]
 
 #include <fmt/format.h>
@@ -32,6 +33,19 @@ struct Drawn {
   double seconds = 0.0;
 };
 
+/// Mean and standard deviation of a sample.
+struct Spread {
+  double mean = 0.0;
+  double sd = 0.0;
+};
+
+Spread spread_of(const std::vector<double>& samples) {
+  const Eigen::Map<const Eigen::ArrayXd> values(samples.data(),
+                                                static_cast<Eigen::Index>(samples.size()));
+  const double mean = values.mean();
+  return {mean, std::sqrt((values - mean).square().sum() / static_cast<double>(values.size() - 1))};
+}
+
 void print_measures(const std::vector<Drawn>& people) {
   const auto table = craniometric_table();
   const auto count = static_cast<Eigen::Index>(people.size());
@@ -52,14 +66,22 @@ void print_measures(const std::vector<Drawn>& people) {
   const Eigen::MatrixXd wanted = craniometric_correlation();
 
   fmt::print(
-      "| measure | men, mean and SD of the table [mm] | women | mean is off by [SD] | SD / "
-      "table's |\n|---|---|---|---|---|\n");
+      "| measure | men, mean and SD of the table [mm] | women | mean is off by [SD] | of the drawn "
+      "| SD / table's | of the drawn |\n|---|---|---|---|---|---|---|\n");
   int sound_means = 0;
   int sound_sds = 0;
   for (Eigen::Index m = 0; m < measures; ++m) {
-    fmt::print("| {} {} | {:.1f} {:.1f} | {:.1f} {:.1f} | {:+.2f} | {:.2f} |\n", table[m].code,
-               table[m].name, table[m].male_mean_mm, table[m].male_sd_mm, table[m].female_mean_mm,
-               table[m].female_sd_mm, mean[m], sd[m]);
+    std::vector<double> drawn;
+    for (const Drawn& one : people) {
+      const PersonParameters& person = one.person;
+      drawn.push_back((person.craniometrics_mm[m] - table[m].mean_mm(person.sex)) /
+                      table[m].sd_mm(person.sex));
+    }
+    const Spread chance = spread_of(drawn);
+    fmt::print("| {} {} | {:.1f} {:.1f} | {:.1f} {:.1f} | {:+.2f} | {:+.2f} | {:.2f} | {:.2f} |\n",
+               table[m].code, table[m].name, table[m].male_mean_mm, table[m].male_sd_mm,
+               table[m].female_mean_mm, table[m].female_sd_mm, mean[m], chance.mean, sd[m],
+               chance.sd);
     sound_means += std::abs(mean[m]) <= 0.2;
     sound_sds += std::abs(sd[m] - 1.0) <= 0.15;
   }
@@ -84,28 +106,35 @@ void print_measures(const std::vector<Drawn>& people) {
 void print_thickness(const std::vector<Drawn>& people) {
   fmt::print(
       "\n| tissue | table's mean and SD [mm] | mean and SD of the people | mean is off by [SD] | "
-      "SD / table's | mean of the closest distance |\n|---|---|---|---|---|---|\n");
+      "of "
+      "the drawn | SD / table's | of the drawn | mean of the closest distance |\n"
+      "|---|---|---|---|---|---|---|---|\n");
   const auto table = thickness_table();
   int sound_means = 0;
   int sound_sds = 0;
   for (std::size_t t = 0; t < table.size(); ++t) {
     std::vector<double> samples;
+    std::vector<double> drawn;
     double closest_mm = 0.0;
-    for (const Drawn& drawn : people) {
-      samples.push_back(drawn.face.thickness_mm[t].left_mm);
-      if (table[t].bilateral) samples.push_back(drawn.face.thickness_mm[t].right_mm);
-      closest_mm += drawn.closest_mm[t] / static_cast<double>(people.size());
+    for (const Drawn& one : people) {
+      samples.push_back(one.face.thickness_mm[t].left_mm);
+      drawn.push_back(one.person.thickness_mm[t].left_mm);
+      if (table[t].bilateral) {
+        samples.push_back(one.face.thickness_mm[t].right_mm);
+        drawn.push_back(one.person.thickness_mm[t].right_mm);
+      }
+      closest_mm += one.closest_mm[t] / static_cast<double>(people.size());
     }
-    const Eigen::Map<const Eigen::ArrayXd> values(samples.data(),
-                                                  static_cast<Eigen::Index>(samples.size()));
-    const double mean = values.mean();
-    const double sd =
-        std::sqrt((values - mean).square().sum() / static_cast<double>(values.size() - 1));
-    const double off = (mean - table[t].mean_mm) / table[t].sd_mm;
-    const double ratio = sd / table[t].sd_mm;
-    fmt::print("| {} {} | {:.1f} {:.1f} | {:.2f} {:.2f} | {:+.2f} | {:.2f} | {:.1f} |\n",
-               table[t].pair, table[t].bone, table[t].mean_mm, table[t].sd_mm, mean, sd, off, ratio,
-               closest_mm);
+    const Spread got = spread_of(samples);
+    const Spread chance = spread_of(drawn);
+    const double off = (got.mean - table[t].mean_mm) / table[t].sd_mm;
+    const double ratio = got.sd / table[t].sd_mm;
+    fmt::print(
+        "| {} {} | {:.1f} {:.1f} | {:.2f} {:.2f} | {:+.2f} | {:+.2f} | {:.2f} | {:.2f} | {:.1f} "
+        "|\n",
+        table[t].pair, table[t].bone, table[t].mean_mm, table[t].sd_mm, got.mean, got.sd, off,
+        (chance.mean - table[t].mean_mm) / table[t].sd_mm, ratio, chance.sd / table[t].sd_mm,
+        closest_mm);
     sound_means += std::abs(off) <= 0.2;
     sound_sds += std::abs(ratio - 1.0) <= 0.15;
   }

@@ -148,7 +148,7 @@ int run(int argc, char** argv) {
   PhantomBody body;
   body.bone = canonical_skull(1.0, 0);
   body.skin = skin;
-  body.canonical_from_patient = [](const Vector3d& p) { return p; };
+  body.canonical_from_patient = [](const Vector3d& p) { return CanonicalPlace{p, p}; };
   const TissueMap tissue(0);
   const auto start = std::chrono::steady_clock::now();
   const auto volume = phantom_ct(body, tissue, {});

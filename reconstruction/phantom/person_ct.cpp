@@ -28,9 +28,10 @@ PhantomBody body_of(const Person& person) {
   PhantomBody body;
   body.bone = person.skull;
   body.skin = person.skin;
+  body.open_from_closed = person.bone.open_from_closed;
   body.canonical_from_patient = [&person](const Vector3d& patient) {
-    return source_nearby(person.face.face_from_canonical,
-                         source_nearby(person.bone.person_from_canonical, patient));
+    const Vector3d skull = source_nearby(person.bone.person_from_canonical, patient);
+    return CanonicalPlace{skull, source_nearby(person.face.face_from_canonical, skull)};
   };
   return body;
 }

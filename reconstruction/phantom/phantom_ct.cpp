@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <string>
 
 #include "core/parallel.h"
@@ -131,24 +130,53 @@ class Bed {
 /// Patient to canonical head, sampled once and interpolated.
 class CanonicalPlaces {
  public:
-  CanonicalPlaces(const PhantomBody& body, int threads)
-      : x_(axis(body, 0, threads)), y_(axis(body, 1, threads)), z_(axis(body, 2, threads)) {}
+  CanonicalPlaces(const PhantomBody& body, int threads) {
+    const Eigen::AlignedBox3d box = bounding_box(body.skin);
+    first_ = box.min();
+    count_ = (box.sizes() / kWarp_mm).array().ceil().cast<int>() + 2;
+    places_.resize(static_cast<std::size_t>(count_.prod()));
+    parallel_for(count_.z(), threads, [&](int k) {
+      std::size_t at = static_cast<std::size_t>(k) * count_.x() * count_.y();
+      for (int j = 0; j < count_.y(); ++j) {
+        for (int i = 0; i < count_.x(); ++i) {
+          const CanonicalPlace place =
+              body.canonical_from_patient(first_ + kWarp_mm * Vector3d(i, j, k));
+          places_[at++] << place.skull.cast<float>(), place.soft.cast<float>();
+        }
+      }
+    });
+  }
 
-  Vector3d at(const Vector3d& patient) const {
-    return {x_.at(patient), y_.at(patient), z_.at(patient)};
+  CanonicalPlace at(const Vector3d& patient) const {
+    const Eigen::Array3d last = count_.cast<double>().array() - 1.001;
+    const Eigen::Array3d place = ((patient - first_) / kWarp_mm).array().max(0.0).min(last);
+    const Eigen::Array3i cell = place.cast<int>();
+    const Eigen::Array3f part = (place - cell.cast<double>()).cast<float>();
+    const std::size_t row = static_cast<std::size_t>(count_.x());
+    const std::size_t slice = row * static_cast<std::size_t>(count_.y());
+    const Places* corner = places_.data() + static_cast<std::size_t>(cell.z()) * slice +
+                           static_cast<std::size_t>(cell.y()) * row +
+                           static_cast<std::size_t>(cell.x());
+    const auto along_x = [&](const Places* p) -> Places { return p[0] + part.x() * (p[1] - p[0]); };
+    const auto along_y = [&](const Places* p) -> Places {
+      const Places near = along_x(p);
+      return near + part.y() * (along_x(p + row) - near);
+    };
+    const Places near = along_y(corner);
+    const Places both = near + part.z() * (along_y(corner + slice) - near);
+    return {both.head<3>().cast<double>(), both.tail<3>().cast<double>()};
   }
 
  private:
-  static ScalarLattice axis(const PhantomBody& body, int k, int threads) {
-    return {bounding_box(body.skin), kWarp_mm,
-            [&body, k](const Vector3d& p) { return body.canonical_from_patient(p)[k]; }, threads};
-  }
+  using Places = Eigen::Matrix<float, 6, 1>;  // of skull and soft tissue
 
-  ScalarLattice x_, y_, z_;
+  Vector3d first_;
+  Eigen::Vector3i count_;
+  std::vector<Places> places_;
 };
 
-double bone_hu(double depth_mm, const Vector3d& canonical) {
-  if (const std::optional<double> tooth = tooth_hu(canonical, depth_mm)) return *tooth;
+double bone_hu(double depth_mm, const Vector3d& canonical, const Rigid3& closed_from_open) {
+  if (const auto tooth = tooth_hu(canonical, closed_from_open, depth_mm)) return *tooth;
   const double share = std::clamp(
       (depth_mm - kCorticalDepth_mm) / (kTrabecularDepth_mm - kCorticalDepth_mm), 0.0, 1.0);
   return kCortical_hu + share * (kTrabecular_hu - kCortical_hu);
@@ -216,6 +244,7 @@ Result<Volume> phantom_ct(const PhantomBody& body, const TissueMap& tissue,
   }
   const Bed bed(body.skin, options);
   const CanonicalPlaces places(body, options.threads);
+  const Rigid3 closed_from_open = body.open_from_closed.inverse();
   std::vector<float> values(grid.count());
   parallel_for(grid.size.z(), options.threads, [&](int k) {
     std::size_t at = grid.index(0, 0, k);
@@ -228,14 +257,14 @@ Result<Volume> phantom_ct(const PhantomBody& body, const TissueMap& tissue,
           values[at] = static_cast<float>(outside_hu);
           continue;
         }
-        const Vector3d canonical = places.at(patient);
-        const TissueKind kind = skin_mm > -1.5 ? TissueKind::skin : tissue.at(canonical);
+        const CanonicalPlace canonical = places.at(patient);
+        const TissueKind kind = skin_mm > -1.5 ? TissueKind::skin : tissue.at(canonical.soft);
         double hu = soft_hu(kind);
         const double bone_mm = bone->distance_mm[at];
         if (bone_mm < kBand_mm) {
           const double share =
               inside_share(bone_mm - bone_offset_mm[static_cast<int>(kind)], voxel_sd_mm);
-          hu += share * (bone_hu(-bone_mm, canonical) - hu);
+          hu += share * (bone_hu(-bone_mm, canonical.skull, closed_from_open) - hu);
         }
         const double share = inside_share(skin_mm - skin_offset_mm, voxel_sd_mm);
         values[at] = static_cast<float>(outside_hu + share * (hu - outside_hu));

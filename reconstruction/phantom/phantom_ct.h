@@ -8,18 +8,27 @@
 
 #include "core/progress.h"
 #include "core/result.h"
+#include "core/transform.h"
 #include "core/triangle_mesh.h"
 #include "reconstruction/phantom/tissue_map.h"
 #include "reconstruction/volume/volume.h"
 
 namespace skullstation {
 
+/// Where a point of a person lies in the canonical head [mm].
+struct CanonicalPlace {
+  Eigen::Vector3d
+      skull;  ///< if it is of bone; the canonical mandible is turned open like the person's
+  Eigen::Vector3d soft;  ///< if it is of soft tissue
+};
+
 /// A person to be scanned, in patient coordinates (LPS) [mm]. All surfaces closed and outward.
 struct PhantomBody {
   TriangleMesh bone;  ///< its surface is met by the 600 HU isosurface; may have several parts
   TriangleMesh skin;  ///< met by the -200 HU isosurface; holds the whole bone
   /// Carries a patient point to the canonical head, smoothly; called from several threads.
-  std::function<Eigen::Vector3d(const Eigen::Vector3d& patient_mm)> canonical_from_patient;
+  std::function<CanonicalPlace(const Eigen::Vector3d& patient_mm)> canonical_from_patient;
+  Rigid3 open_from_closed;  ///< how the canonical mandible is turned
 };
 
 struct PhantomCtOptions {

@@ -7,9 +7,11 @@
 #include <memory>
 #include <utility>
 
+#include "reconstruction/phantom/canonical_skull.h"
 #include "reconstruction/phantom/isosurface.h"
 #include "reconstruction/phantom/phantom_ct_distance.h"
 #include "reconstruction/phantom/phantom_ct_scanner.h"
+#include "reconstruction/phantom/tissue_teeth.h"
 
 namespace skullstation {
 namespace {
@@ -51,7 +53,10 @@ PhantomBody ball_in_ball() {
   PhantomBody body;
   body.bone = ball(kCenter_mm, kBoneRadius_mm);
   body.skin = ball(kCenter_mm, kSkinRadius_mm);
-  body.canonical_from_patient = [](const Vector3d&) { return Vector3d(25, 25, -90); };
+  body.canonical_from_patient = [](const Vector3d&) {
+    const Vector3d neck(25, 25, -90);
+    return CanonicalPlace{neck, neck};
+  };
   return body;
 }
 
@@ -282,6 +287,21 @@ TEST(PhantomCt, StopsWhenAsked) {
   const auto volume = phantom_ct(ball_in_ball(), tissue(), quiet(), progress);
   ASSERT_FALSE(volume);
   EXPECT_EQ(volume.error().kind, ErrorKind::cancelled);
+}
+
+TEST(ToothHu, LowerTeethAreFoundWhereTheOpenJawHasThem) {
+  const Rigid3 open = mandible_opening(8.0);
+  const Vector3d upper(8.0, -93.0, -36.5);
+  const Vector3d lower(3.0, -92.0, -46.5);
+  const Vector3d behind(0.0, -60.0, -40.0);
+  EXPECT_EQ(tooth_hu(upper, {}, 0.5), 2500.0);
+  EXPECT_EQ(tooth_hu(upper, {}, 2.0), 1700.0);
+  EXPECT_EQ(tooth_hu(lower, {}, 0.5), 2500.0);
+  EXPECT_FALSE(tooth_hu(behind, {}, 0.5));
+  EXPECT_EQ(tooth_hu(upper, open.inverse(), 0.5), 2500.0);
+  EXPECT_EQ(tooth_hu(open * lower, open.inverse(), 0.5), 2500.0);
+  EXPECT_FALSE(tooth_hu(open * lower, {}, 0.5));
+  EXPECT_FALSE(tooth_hu(lower, open.inverse(), 0.5));  // between the open jaws
 }
 
 TEST(TissueMap, KnowsTheOrgansOfTheHead) {
