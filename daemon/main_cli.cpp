@@ -79,6 +79,12 @@ void add_commands(CLI::App& app, Command& chosen) {
         reconstruct.add_option("--quality", o.quality, "the finer, the slower")
             ->capture_default_str()
             ->check(CLI::IsMember({"draft", "standard", "fine"}));
+        reconstruct
+            .add_option("--close-holes", o.close_holes_mm,
+                        "close openings with a rim up to this long [mm] by a guess, marked in "
+                        "skull.ply; 0: none")
+            ->capture_default_str()
+            ->check(CLI::NonNegativeNumber);
       });
 
   CLI::App* calibrate = app.add_subcommand("calibrate", "measure cameras and table");

@@ -15,6 +15,7 @@
 
 #include "bench/photogrammetry/bench_scene.h"
 #include "bench/photogrammetry/bench_views.h"
+#include "bench/photogrammetry/bridges.h"
 #include "bench/photogrammetry/surface_measures.h"
 #include "bench/seconds.h"
 #include "core/session/image_file.h"
@@ -79,6 +80,24 @@ void print_accuracy(const SurfaceMeasures& m, double wall_s) {
                slant.seen_cm2, slant.within_half_mm_percent);
   }
   fmt::print("\n");
+}
+
+/// What the surface has that the specimen has not.
+void print_bridges(const std::vector<Bridge>& bridges) {
+  double total_cm2 = 0.0;
+  std::size_t large = 0;
+  for (const Bridge& bridge : bridges) {
+    total_cm2 += bridge.area_cm2;
+    large += bridge.area_cm2 >= 0.1 ? 1 : 0;
+  }
+  fmt::print("farther than 1 mm from the truth: {:.1f} cm2 in {} patches, {} of 0.1 cm2 or more\n",
+             total_cm2, bridges.size(), large);
+  for (std::size_t i = 0; i < std::min<std::size_t>(large, 5); ++i) {
+    const Bridge& bridge = bridges[i];
+    fmt::print("  {:.2f} cm2, up to {:.1f} mm off, at ({:.0f}, {:.0f}, {:.0f}) mm\n",
+               bridge.area_cm2, bridge.most_mm, bridge.middle_mm.x(), bridge.middle_mm.y(),
+               bridge.middle_mm.z());
+  }
 }
 
 Result<std::filesystem::path> scene_of(const Options& options) {
@@ -155,6 +174,7 @@ Result<void> run(const Options& options) {
   const auto measures = measure_surface(surface->mesh, *truth, *views, options.threads);
   if (!measures) return forward(measures);
   print_accuracy(*measures, wall_s);
+  print_bridges(find_bridges(surface->mesh, *truth, 1.0, options.threads));
   fmt::print("voxel {:.2f} mm, {} vertices, {} triangles, border {:.0f} mm\n", how.fusion.voxel_mm,
              surface->mesh.vertices.rows(), surface->mesh.triangles.rows(),
              surface->coverage.open_edge_mm);

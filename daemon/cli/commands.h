@@ -64,6 +64,7 @@ struct ReconstructCommand {
   std::string poses = "auto";              ///< auto, board, given, sfm
   std::string quality = "standard";        ///< draft, standard, fine
   std::optional<double> camera_radius_mm;  ///< of the first camera from the table's axis
+  double close_holes_mm = 0.0;             ///< longest rim of an opening that is closed; 0: none
 };
 Result<CommandReport> run(const ReconstructCommand&, const CommonOptions&, const Progress&);
 

@@ -26,6 +26,7 @@ ReconstructionOptions options_of(const ReconstructCommand& command, const Common
   if (command.poses == "given") options.poses.method = PoseMethod::given;
   if (command.poses == "sfm") options.poses.method = PoseMethod::motion;
   options.poses.motion.camera_radius_mm = command.camera_radius_mm;
+  options.closed_rim_mm = command.close_holes_mm;
   if (command.quality == "draft") options.quality = ReconstructionQuality::draft;
   if (command.quality == "fine") options.quality = ReconstructionQuality::fine;
   return options;
@@ -63,6 +64,17 @@ Result<void> write_model(const ReconstructedSurface& surface, const fs::path& pa
                    {textured.coordinates, encode_jpeg(textured.atlas, texture_quality)}, path);
 }
 
+/// With a mark at each vertex that is a guess, where there may be such.
+Result<void> write_surface(const ReconstructedSurface& surface, const fs::path& path) {
+  const std::vector<bool>& filled = surface.filled.vertices;
+  if (filled.empty()) return write_ply(surface.mesh, path);
+  VertexScalar mark{"filled", Eigen::VectorXd(surface.mesh.vertices.rows())};
+  for (std::size_t v = 0; v < filled.size(); ++v) {
+    mark.values[static_cast<Eigen::Index>(v)] = filled[v] ? 1.0 : 0.0;
+  }
+  return write_ply(surface.mesh, path, {mark});
+}
+
 /// All sides of a coloured mesh in one picture.
 Result<void> write_sheet(const TriangleMesh& mesh, const fs::path& file, int threads) {
   constexpr int size_px = 320;
@@ -79,7 +91,7 @@ Result<void> write_parts(const SessionReconstruction& reconstruction, const fs::
   const auto cameras = format_session(reconstruction.cameras);
   if (!cameras) return forward(cameras);
   for (const auto& written :
-       {write_ply(mesh, folder / "skull.ply"),
+       {write_surface(reconstruction.surface, folder / "skull.ply"),
         write_model(reconstruction.surface, folder / "skull.glb"),
         write_ply(by_coverage, folder / "coverage.ply"),
         write_file_durably(folder / "cameras.json", *cameras),

@@ -55,11 +55,13 @@ QualityFigures quality_figures(const SessionReconstruction& reconstruction) {
   figures.ground_sample_mm = percentile(std::move(sizes), 0.5);
   figures.accuracy_mm = percentile(errors, 0.5);
   figures.accuracy_p95_mm = percentile(std::move(errors), 0.95);
+  const FilledOpenings& filled = reconstruction.surface.filled;
+  const auto measured =
+      static_cast<double>(coverage.views.size() - std::ranges::count(filled.vertices, true));
   figures.seen_by_three_percent =
-      coverage.views.empty()
-          ? 0.0
-          : 100.0 * static_cast<double>(by_three) / static_cast<double>(coverage.views.size());
-  figures.area_cm2 = 0.01 * surface_area(reconstruction.surface.mesh);
+      measured > 0.0 ? 100.0 * static_cast<double>(by_three) / measured : 0.0;
+  figures.area_cm2 = 0.01 * surface_area(reconstruction.surface.mesh) - filled.area_cm2;
+  figures.filled_cm2 = filled.area_cm2;
   figures.open_edge_mm = coverage.open_edge_mm;
   return figures;
 }
@@ -83,6 +85,12 @@ std::vector<std::string> quality_verdicts(const SessionReconstruction& reconstru
         fmt::format("only {:.0f} % of the surface is seen by 3 views or more; take more views, or "
                     "a pass with the specimen turned over",
                     figures.seen_by_three_percent));
+  }
+  if (figures.filled_cm2 > 0.0) {
+    verdicts.push_back(fmt::format(
+        "{:.2f} cm2 were not measured: {} openings were closed as their rims bend, the vertices' "
+        "property `filled` marks them",
+        figures.filled_cm2, reconstruction.surface.filled.closed));
   }
   constexpr double coarse_mm = 0.5;
   if (figures.ground_sample_mm > coarse_mm) {
@@ -143,6 +151,8 @@ std::string quality_json(const SessionReconstruction& reconstruction) {
                      {"triangles", reconstruction.surface.mesh.triangles.rows()},
                      {"area_cm2", rounded(figures.area_cm2)},
                      {"open_edge_mm", rounded(figures.open_edge_mm)},
+                     {"filled_cm2", rounded(figures.filled_cm2)},
+                     {"openings_filled", reconstruction.surface.filled.closed},
                      {"seen_by_three_percent", rounded(figures.seen_by_three_percent)},
                      {"vertices_by_views", histogram_of(reconstruction.surface.coverage.views)}};
   Json lenses = Json::array();

@@ -16,8 +16,9 @@ struct QualityFigures {
   double ground_sample_mm = 0.0;  ///< median size of a photograph's pixel on the specimen
   double accuracy_mm = 0.0;       ///< median estimated standard error along the normal
   double accuracy_p95_mm = 0.0;
-  double seen_by_three_percent = 0.0;  ///< of the vertices
-  double area_cm2 = 0.0;
+  double seen_by_three_percent = 0.0;  ///< of the measured vertices
+  double area_cm2 = 0.0;               ///< measured
+  double filled_cm2 = 0.0;             ///< closed by a guess
   double open_edge_mm = 0.0;
 };
 QualityFigures quality_figures(const SessionReconstruction& reconstruction);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "reconstruction/mesh/decimation.h"
+#include "reconstruction/mesh/hole_filling.h"
 #include "reconstruction/photogrammetry/surface_colors.h"
 #include "reconstruction/photogrammetry/surface_extraction.h"
 #include "reconstruction/photogrammetry/visual_hull.h"
@@ -53,6 +54,29 @@ TriangleMesh thinned(TriangleMesh mesh, double edge_mm, double voxel_mm) {
   return mesh;
 }
 
+/// Closes openings and says which vertices are a guess.
+FilledOpenings close_openings(TriangleMesh& mesh, double longest_rim_mm) {
+  FilledSurface closed = fill_holes(mesh, longest_rim_mm);
+  FilledOpenings filled;
+  filled.area_cm2 = 0.01 * closed.filled_mm2;
+  filled.closed = closed.holes_filled;
+  filled.left_open = closed.holes_left;
+  for (const int origin : closed.origin) filled.vertices.push_back(origin < 0);
+  mesh = std::move(closed.mesh);
+  mesh.normals = vertex_normals(mesh);
+  return filled;
+}
+
+/// A guess is no measurement, even where photographs show it.
+void take_out_guesses(const FilledOpenings& filled, Coverage& coverage) {
+  for (std::size_t v = 0; v < filled.vertices.size(); ++v) {
+    if (!filled.vertices[v]) continue;
+    coverage.views[v] = 0;
+    coverage.ground_sample_mm[v] = 0.0f;
+    coverage.accuracy_mm[v] = 0.0f;
+  }
+}
+
 }  // namespace
 
 SurfaceOptions SurfaceOptions::of(ReconstructionQuality quality,
@@ -76,6 +100,9 @@ Result<void> SurfaceOptions::validate() const {
   }
   if (!(edge_mm >= 0.0 && edge_mm <= 50.0) || !(textured_edge_voxels >= 0.0)) {
     return fail(ErrorKind::usage, "surface options", "edge_mm is 0 (as extracted) to 50");
+  }
+  if (!(closed_rim_mm >= 0.0)) {
+    return fail(ErrorKind::usage, "surface options", "a rim can't be shorter than 0 mm");
   }
   if (!(match_sd_px > 0.0)) {
     return fail(ErrorKind::usage, "surface options", "match_sd_px must be positive");
@@ -132,14 +159,20 @@ Result<ReconstructedSurface> surface_of_depths(std::vector<DepthMap> maps,
   const double gap_mm = fusion.voxel_mm * fusion.truncation_voxels;
   result.mesh = thinned(std::move(surface.mesh), options.edge_mm, fusion.voxel_mm);
   {
+    // What is measured decides what each view sees: a guess hides nothing.
     const Sights sights(result.mesh, views, gap_mm, options.threads);
     options.after_stage("sights");
+    if (options.closed_rim_mm > 0.0) {
+      result.filled = close_openings(result.mesh, options.closed_rim_mm);
+      options.after_stage("closed openings");
+    }
     result.mesh.colors =
         SurfaceColors(result.mesh, sights, options.threads).vertex_colors(options.threads);
     options.after_stage("colours");
     const double match_sd_px =
         options.match_sd_px * static_cast<double>(1 << options.depth.finest_level);
     result.coverage = measure_coverage(result.mesh, sights, match_sd_px, options.threads);
+    take_out_guesses(result.filled, result.coverage);
     options.after_stage("coverage");
   }
   if (options.texture) {

@@ -30,6 +30,8 @@ struct SurfaceOptions {
   CleaningOptions cleaning;
   /// Mean edge length of the surface [mm]; 0: as it was extracted, about the voxel's size.
   double edge_mm = 0.0;
+  /// Openings with a rim up to this long [mm] are closed by a guess, marked as such; 0: none.
+  double closed_rim_mm = 0.0;
   /// The textured surface is a coarser one, since its texture carries the fine detail; nothing:
   /// no texture.
   std::optional<TextureOptions> texture = TextureOptions{};
@@ -46,9 +48,18 @@ struct SurfaceOptions {
   Result<void> validate() const;
 };
 
+/// What was closed without having been measured.
+struct FilledOpenings {
+  std::vector<bool> vertices;  ///< of the mesh: is it a guess? Empty if no closing was asked for
+  double area_cm2 = 0.0;
+  int closed = 0;
+  int left_open = 0;
+};
+
 struct ReconstructedSurface {
   TriangleMesh mesh;  ///< table frame, mm; normals, colours
-  Coverage coverage;  ///< of the mesh's vertices
+  Coverage coverage;  ///< of the mesh's vertices; 0 for those that are a guess
+  FilledOpenings filled;
   std::optional<TexturedSurface> textured;
 };
 

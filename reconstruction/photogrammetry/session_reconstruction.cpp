@@ -264,6 +264,7 @@ Result<SessionReconstruction> reconstruct_session(const Session& session,
   masks->clear();
   SurfaceOptions surface = SurfaceOptions::of(options.quality, passes.front().views);
   surface.depth.seed = options.seed;
+  surface.closed_rim_mm = options.closed_rim_mm;
   surface.threads = options.threads;
   if (const auto found = find_depths_of_passes(passes, surface, progress.part(0.18, 0.8)); !found) {
     return forward(found);

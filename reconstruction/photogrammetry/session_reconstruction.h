@@ -15,6 +15,7 @@ namespace skullstation {
 struct ReconstructionOptions {
   PoseOptions poses;
   ReconstructionQuality quality = ReconstructionQuality::standard;
+  double closed_rim_mm = 0.0;  ///< SurfaceOptions::closed_rim_mm
   std::uint64_t seed = 1;
   int threads = 0;
 };

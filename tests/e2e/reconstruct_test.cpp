@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
@@ -171,6 +172,40 @@ TEST_F(Reconstruct, AnotherBoardIsNotFound) {
   const auto result = reconstruct();
   EXPECT_EQ(result.exit_code, 5);
   EXPECT_THAT(result.err, HasSubstr("is it another board?"));
+}
+
+/// Each pixel the mean of those up to `radius` beside it in its row, then in its column.
+Image8 blurred(const Image8& image, int radius) {
+  Image8 from = image;
+  for (const auto& [right, down] : {std::pair(1, 0), std::pair(0, 1)}) {
+    Image8 to = from;
+    for (int y = 0; y < from.height; ++y) {
+      for (int x = 0; x < from.width; ++x) {
+        for (int c = 0; c < from.channels; ++c) {
+          int sum = 0;
+          for (int i = -radius; i <= radius; ++i) {
+            sum += from.at(std::clamp(x + i * right, 0, from.width - 1),
+                           std::clamp(y + i * down, 0, from.height - 1), c);
+          }
+          to.at(x, y, c) = static_cast<std::uint8_t>(sum / (2 * radius + 1));
+        }
+      }
+    }
+    from = to;
+  }
+  return from;
+}
+
+TEST_F(Reconstruct, ABlurredViewIsLeftOutAndNamed) {
+  const auto image = read_image(session() / "images/p0_c1_007.png");
+  ASSERT_TRUE(image);
+  ASSERT_TRUE(
+      write_file_durably(session() / "images/p0_c1_007.png", encode_png(blurred(*image, 5))));
+  const auto result = reconstruct({"--quality", "draft"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json["views_used"], 23);
+  EXPECT_THAT(json["verdicts"].dump(), HasSubstr("p0_c1_007.png is left out"));
 }
 
 TEST_F(Reconstruct, AViewOfNothingIsLeftOutAndNamed) {

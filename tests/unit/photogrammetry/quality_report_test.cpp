@@ -63,6 +63,20 @@ TEST(QualityReport, CountsViewsAreaAndCoverage) {
   EXPECT_DOUBLE_EQ(figures.open_edge_mm, 68.0);
 }
 
+TEST(QualityReport, TellsWhatIsAGuessFromWhatIsMeasured) {
+  SessionReconstruction reconstruction = good_reconstruction();
+  reconstruction.surface.coverage.views[0] = 0;  // a guess
+  reconstruction.surface.filled = {{true, false, false}, 0.5, 2, 0};
+  const QualityFigures figures = quality_figures(reconstruction);
+  EXPECT_NEAR(figures.area_cm2, 1.5, 1e-9);
+  EXPECT_DOUBLE_EQ(figures.filled_cm2, 0.5);
+  EXPECT_DOUBLE_EQ(figures.seen_by_three_percent, 100.0);
+  EXPECT_THAT(verdicts_of(reconstruction), Contains(HasSubstr("0.50 cm2 were not measured")));
+  const auto json = nlohmann::json::parse(quality_json(reconstruction));
+  EXPECT_EQ(json["surface"]["filled_cm2"], 0.5);
+  EXPECT_EQ(json["surface"]["openings_filled"], 2);
+}
+
 TEST(QualityReport, NamesAViewThatIsLeftOutAndWhy) {
   SessionReconstruction reconstruction = good_reconstruction();
   reconstruction.poses.views[1].dropped = "does not show the board";

@@ -155,6 +155,52 @@ TEST(ReconstructSurface, MeasuresABall) {
   EXPECT_EQ(surface->mesh.colors.rows(), surface->mesh.vertices.rows());
 }
 
+TEST(ReconstructSurface, ClosesOpeningsOnRequestAndMarksThem) {
+  const BallScene scene;
+  const auto views = photograph(scene);
+  auto maps = true_depth_maps(scene, views);
+  // No view knows the depth on a spot of 8 mm across that faces the ring of cameras.
+  const Eigen::Vector3d spot =
+      scene.centre_mm + scene.radius_mm * Eigen::Vector3d(0.9, 0.0, std::sqrt(0.19));
+  for (DepthMap& map : maps) {
+    const Rigid3 back = map.camera_from_table.inverse();
+    for (int y = 0; y < map.camera.height; ++y) {
+      for (int x = 0; x < map.camera.width; ++x) {
+        InversePlane& plane = map.planes[map.index(x, y)];
+        if (plane.w == 0.0f) continue;
+        const Eigen::Vector3d point =
+            back * Eigen::Vector3d(map.camera.ray(x + 0.5, y + 0.5) / plane.w);
+        if ((point - spot).norm() < 4.0) plane = {};
+      }
+    }
+  }
+  SurfaceOptions options = small_options(views);
+  options.fusion.voxel_mm = 1.0;
+  options.texture.reset();
+  const auto open = surface_of_depths(maps, views, options);
+  ASSERT_TRUE(open) << open.error().message();
+  EXPECT_TRUE(open->filled.vertices.empty());
+  options.closed_rim_mm = 60.0;
+  const auto closed = surface_of_depths(maps, views, options);
+  ASSERT_TRUE(closed) << closed.error().message();
+  const FilledOpenings& filled = closed->filled;
+  // The ragged border below has pinholes, too.
+  EXPECT_GE(filled.closed, 1);
+  EXPECT_GE(filled.left_open, 1) << "the large one below";
+  EXPECT_GT(filled.area_cm2, 0.3);
+  EXPECT_LT(filled.area_cm2, 2.0);
+  EXPECT_LT(closed->coverage.open_edge_mm, open->coverage.open_edge_mm - 10.0);
+  ASSERT_EQ(filled.vertices.size(), static_cast<std::size_t>(closed->mesh.vertices.rows()));
+  int over_the_spot = 0;
+  for (std::size_t v = 0; v < filled.vertices.size(); ++v) {
+    if (!filled.vertices[v]) continue;
+    EXPECT_EQ(closed->coverage.views[v], 0);
+    const Eigen::Vector3d point = closed->mesh.vertices.row(static_cast<Eigen::Index>(v));
+    over_the_spot += (point - spot).norm() < 5.0 ? 1 : 0;
+  }
+  EXPECT_GT(over_the_spot, 10);
+}
+
 TEST(ReconstructSurface, RefusesWhatItCannotDo) {
   BallScene scene;
   scene.views = 8;  // 45 deg apart on the table
