@@ -30,7 +30,7 @@ struct Bounds {
   double least_overlap;
 };
 
-constexpr Bounds kBone{25.0, 1.25, 35.0, 35.0, 0.4};
+constexpr Bounds kBone{25.0, 1.6, 35.0, 45.0, 0.4};
 constexpr Bounds kGroup{8.0, 1.1, 10.0, 8.0, 0.4};
 constexpr Bounds kRegion{6.0, 1.1, 10.0, 6.0, 0.5};
 
@@ -112,24 +112,29 @@ std::optional<Similarity3> align_part(const OrientedPoints& points, const Target
   std::optional<Similarity3> best;
   double least = cost_of(points, parent, target);
   for (const Similarity3& start : starts) {
-    PointIcpOptions options;
-    options.estimate_scale = true;
-    options.max_normal_angle_deg = 50.0;
-    options.tolerance_mm = 1e-2;
-    options.threads = 1;
-    options.max_distance_mm = bounds.max_distance_mm;
-    auto fit = align_points(points, target.points, target.tree, start, options);
-    if (!fit) continue;
-    options.max_distance_mm = 0.5 * bounds.max_distance_mm;
-    fit = align_points(points, target.points, target.tree, fit->target_from_source, options);
-    if (!fit || fit->overlap < bounds.least_overlap ||
-        !within(bounds, fit->target_from_source, parent, centroid)) {
-      continue;
+    // With its size free from the beginning, a part that is far off may shrink into what is near;
+    // with its size held, one that is far too small may slide along.
+    for (const bool free_size : {true, false}) {
+      PointIcpOptions options;
+      options.estimate_scale = free_size;
+      options.max_normal_angle_deg = 50.0;
+      options.tolerance_mm = 1e-2;
+      options.threads = 1;
+      options.max_distance_mm = bounds.max_distance_mm;
+      auto fit = align_points(points, target.points, target.tree, start, options);
+      if (!fit) continue;
+      options.estimate_scale = true;
+      options.max_distance_mm = 0.5 * bounds.max_distance_mm;
+      fit = align_points(points, target.points, target.tree, fit->target_from_source, options);
+      if (!fit || fit->overlap < bounds.least_overlap ||
+          !within(bounds, fit->target_from_source, parent, centroid)) {
+        continue;
+      }
+      const double cost = cost_of(points, fit->target_from_source, target);
+      if (cost >= least) continue;
+      least = cost;
+      best = fit->target_from_source;
     }
-    const double cost = cost_of(points, fit->target_from_source, target);
-    if (cost >= least) continue;
-    least = cost;
-    best = fit->target_from_source;
   }
   return best;
 }
@@ -151,7 +156,7 @@ std::vector<Similarity3> mandible_starts(const SkullTemplate& skull, const Trian
   const Eigen::Vector3d hinge = cranium * Eigen::Vector3d(0.5 * (*left + *right));
   const Eigen::Vector3d axis = (*left - *right).normalized();
   for (const double opening_deg : {0.0, 10.0, 20.0}) {
-    for (const double drop_mm : {0.0, 10.0}) {  // a longer face, a thick disc in the joint
+    for (const double drop_mm : {0.0, 10.0, 20.0}) {  // a longer face, a thick disc in the joint
       Similarity3 start;
       start.rotation = Eigen::AngleAxisd(radians(opening_deg), axis);
       start.translation = hinge - start.rotation * hinge - drop_mm * Eigen::Vector3d::UnitZ();
