@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace skullstation {
@@ -14,6 +15,7 @@ namespace {
 constexpr int air_hu = -1000;
 constexpr int tolerance_hu = 60;
 constexpr int padding_gap_hu = 200;
+constexpr int highest_padding_hu = -1500;
 
 void shift(Volume& volume, int offset) {
   for (std::int16_t& hu : volume.hu) {
@@ -41,13 +43,15 @@ std::optional<int> peak_below_tissue(const Histogram& histogram, std::size_t vox
   return lowest_hu + static_cast<int>(*best) * bin_hu + bin_hu / 2;
 }
 
-/// Without the padding outside the scanner's round field, which is one value far below all others.
+/// Without the padding outside the scanner's round field, which is one value far below all others
+/// and below any air: air stands to padding of -2000 as tissue stands to air.
 Histogram without_padding(Histogram histogram) {
   const auto filled = [](std::size_t count) { return count > 0; };
   const auto first = std::ranges::find_if(histogram, filled);
   if (first == histogram.end()) return histogram;
   const auto second = std::find_if(first + 1, histogram.end(), filled);
-  if (second - first > padding_gap_hu / bin_hu) *first = 0;
+  const auto value_hu = lowest_hu + bin_hu * static_cast<int>(first - histogram.begin());
+  if (value_hu < highest_padding_hu && second - first > padding_gap_hu / bin_hu) *first = 0;
   return histogram;
 }
 
@@ -58,10 +62,7 @@ std::optional<int> air_peak(const Volume& volume) {
   for (const std::int16_t hu : volume.hu) {
     ++histogram[static_cast<std::size_t>((hu - lowest_hu) / bin_hu)];
   }
-  // Air stands to padding as tissue stands to air. Where nothing is air once padding is gone, what
-  // looked like padding was air without noise.
-  const auto peak = peak_below_tissue(without_padding(histogram), volume.hu.size());
-  return peak ? peak : peak_below_tissue(histogram, volume.hu.size());
+  return peak_below_tissue(without_padding(std::move(histogram)), volume.hu.size());
 }
 
 Result<void> apply_hu_offset(Volume& volume, const VolumeReadOptions& options,
