@@ -8,10 +8,10 @@
 #include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/phantom/canonical_skin.h"
 #include "reconstruction/phantom/implicit_solid.h"
+#include "reconstruction/registration/surface_places.h"
 #include "reconstruction/templates/head_regions.h"
 #include "reconstruction/templates/make_templates.h"
 #include "reconstruction/templates/remeshing.h"
-#include "reconstruction/registration/surface_places.h"
 
 namespace skullstation {
 
