@@ -31,11 +31,12 @@ function(skullstation_precompile_words)
 endfunction()
 
 # skullstation_library(NAME SOURCES a.cpp ... [PUBLIC targets ...] [PRIVATE targets ...]
-#                      [WITHOUT_WORDS])
+#                      [WITHOUT_WORDS] [UNSANITIZED])
 # makes the static library skullstation_NAME, alias skullstation::NAME. WITHOUT_WORDS: for what is
-# compiled with other flags or another Eigen than everything else.
+# compiled with other flags or another Eigen than everything else. UNSANITIZED: for what is nearly
+# all a library's templates, which take minutes to compile with sanitizers.
 function(skullstation_library name)
-  cmake_parse_arguments(ARG "WITHOUT_WORDS" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "WITHOUT_WORDS;UNSANITIZED" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(skullstation_${name} STATIC ${ARG_SOURCES})
   add_library(skullstation::${name} ALIAS skullstation_${name})
   target_link_libraries(skullstation_${name}
@@ -43,6 +44,9 @@ function(skullstation_library name)
     PRIVATE ${ARG_PRIVATE} fmt::fmt)
   if(SKULLSTATION_PCH AND NOT ARG_WITHOUT_WORDS)
     target_precompile_headers(skullstation_${name} REUSE_FROM skullstation_words)
+  endif()
+  if(SKULLSTATION_SANITIZE AND ARG_UNSANITIZED)
+    target_compile_options(skullstation_${name} PRIVATE -fno-sanitize=all)
   endif()
 endfunction()
 
