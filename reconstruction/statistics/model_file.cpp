@@ -105,7 +105,8 @@ class ModelReader {
   template <class Matrix>
   Matrix of_width(const std::string& path, Index columns) {
     const Eigen::MatrixXd values = matrix(path);
-    if (values.cols() != columns && values.size() > 0) {
+    if (values.size() == 0) return Matrix(0, columns);  // none there, or already refused
+    if (values.cols() != columns) {
       refuse(path, fmt::format("has {} columns instead of {}", values.cols(), columns));
       return Matrix(0, columns);
     }
