@@ -19,8 +19,8 @@ class DistanceGrid {
 
  private:
   float at(const Eigen::Array3i& point) const {
-    return values_[static_cast<std::size_t>((point.z() * counts_.y() + point.y()) * counts_.x() +
-                                            point.x())];
+    const Eigen::Index row = Eigen::Index{point.z()} * counts_.y() + point.y();
+    return values_[static_cast<std::size_t>(row * counts_.x() + point.x())];
   }
 
   double cell_mm_;

@@ -37,9 +37,9 @@ double relative_edge(HeadRegion region) {
 
 double data_weight(HeadRegion region) {
   switch (region) {
-    case HeadRegion::ears: return 0.3;   // folds that scans show in part
-    case HeadRegion::scalp: return 0.5;  // hair
-    case HeadRegion::neck: return 0.5;   // clothes, cables, the scan's end
+    case HeadRegion::ears: return 0.3;  // folds that scans show in part
+    case HeadRegion::scalp:             // hair
+    case HeadRegion::neck: return 0.5;  // clothes, cables, the scan's end
     default: return 1.0;
   }
 }
