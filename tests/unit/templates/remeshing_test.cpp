@@ -3,53 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <map>
+
+#include "tests/unit/distance/shapes.h"
 
 namespace skullstation {
 namespace {
 
-/// A ball of that radius from a subdivided octahedron.
-TriangleMesh ball(double radius_mm, int subdivisions) {
-  TriangleMesh mesh;
-  mesh.vertices.resize(6, 3);
-  mesh.vertices << 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1;
-  mesh.triangles.resize(8, 3);
-  mesh.triangles << 0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4, 2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5;
-  for (int s = 0; s < subdivisions; ++s) {
-    std::map<std::pair<int, int>, int> middle;
-    std::vector<Eigen::Vector3d> points;
-    for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
-      points.emplace_back(mesh.vertices.row(v));
-    }
-    const auto between = [&](int a, int b) {
-      const auto [place, added] =
-          middle.try_emplace(std::minmax(a, b), static_cast<int>(points.size()));
-      if (added) {
-        const Eigen::Vector3d sum =
-            points[static_cast<std::size_t>(a)] + points[static_cast<std::size_t>(b)];
-        points.emplace_back(sum.normalized());
-      }
-      return place->second;
-    };
-    Triangles finer(4 * mesh.triangles.rows(), 3);
-    for (Eigen::Index f = 0; f < mesh.triangles.rows(); ++f) {
-      const int a = mesh.triangles(f, 0);
-      const int b = mesh.triangles(f, 1);
-      const int c = mesh.triangles(f, 2);
-      const int ab = between(a, b);
-      const int bc = between(b, c);
-      const int ca = between(c, a);
-      finer.middleRows(4 * f, 4) << a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca;
-    }
-    mesh.triangles = finer;
-    mesh.vertices.resize(static_cast<Eigen::Index>(points.size()), 3);
-    for (std::size_t v = 0; v < points.size(); ++v) {
-      mesh.vertices.row(static_cast<Eigen::Index>(v)) = points[v].transpose();
-    }
-  }
-  mesh.vertices *= radius_mm;
-  return mesh;
-}
+using testing::sphere;
 
 /// How many triangles each edge has.
 std::map<std::pair<int, int>, int> edge_uses(const TriangleMesh& mesh) {
@@ -63,7 +23,7 @@ std::map<std::pair<int, int>, int> edge_uses(const TriangleMesh& mesh) {
 }
 
 TEST(Clipped, KeepsTheHalfOfABallWithItsRimInThePlane) {
-  const TriangleMesh half = clipped(ball(30.0, 4), Eigen::Vector3d::UnitX(), 0.0, 0.2);
+  const TriangleMesh half = clipped(sphere(30.0, 4), Eigen::Vector3d::UnitX(), 0.0, 0.2);
   EXPECT_GE(half.vertices.col(0).minCoeff(), 0.0);
   EXPECT_NEAR(surface_area(half), 0.5 * 4.0 * M_PI * 900.0, 60.0);
   for (const auto& [edge, count] : edge_uses(half)) {
@@ -81,7 +41,7 @@ TEST(Remeshed, MakesEvenTrianglesOfTheWantedSizeOnTheSurface) {
   options.project = [](const Eigen::Vector3d& point, const Eigen::Vector3d&) {
     return Eigen::Vector3d(30.0 * point.normalized());
   };
-  const TriangleMesh mesh = remeshed(ball(30.0, 4), options);
+  const TriangleMesh mesh = remeshed(sphere(30.0, 4), options);
   const auto uses = edge_uses(mesh);
   double sum = 0.0;
   for (const auto& [edge, count] : uses) {
@@ -103,7 +63,7 @@ TEST(Remeshed, FollowsASizeThatVaries) {
   options.project = [](const Eigen::Vector3d& point, const Eigen::Vector3d&) {
     return Eigen::Vector3d(30.0 * point.normalized());
   };
-  const TriangleMesh mesh = remeshed(ball(30.0, 4), options);
+  const TriangleMesh mesh = remeshed(sphere(30.0, 4), options);
   const auto above = (mesh.vertices.col(2).array() > 3.0).count();
   const auto below = (mesh.vertices.col(2).array() < -3.0).count();
   EXPECT_GT(above, 4 * below);
