@@ -82,6 +82,14 @@ void print_accuracy(const SurfaceMeasures& m, double wall_s) {
   fmt::print("\n");
 }
 
+void print_estimates(const std::array<EstimatedAccuracy, 5>& fifths) {
+  fmt::print("stated accuracy against the truth, by fifths of the vertices:\n");
+  for (const EstimatedAccuracy& fifth : fifths) {
+    fmt::print("  stated {:.3f} mm, is {:.3f} mm, {:.0f} % within twice the statement\n",
+               fifth.estimate_mm, fifth.error_mm, fifth.within_twice_percent);
+  }
+}
+
 /// What the surface has that the specimen has not.
 void print_bridges(const std::vector<Bridge>& bridges) {
   double total_cm2 = 0.0;
@@ -174,6 +182,8 @@ Result<void> run(const Options& options) {
   const auto measures = measure_surface(surface->mesh, *truth, *views, options.threads);
   if (!measures) return forward(measures);
   print_accuracy(*measures, wall_s);
+  print_estimates(
+      check_estimates(surface->mesh, surface->coverage.accuracy_mm, *truth, options.threads));
   print_bridges(find_bridges(surface->mesh, *truth, 1.0, options.threads));
   fmt::print("voxel {:.2f} mm, {} vertices, {} triangles, border {:.0f} mm\n", how.fusion.voxel_mm,
              surface->mesh.vertices.rows(), surface->mesh.triangles.rows(),

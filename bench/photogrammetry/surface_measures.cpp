@@ -125,4 +125,37 @@ Result<SurfaceMeasures> measure_surface(const TriangleMesh& surface, const Trian
   return measures;
 }
 
+std::array<EstimatedAccuracy, 5> check_estimates(const TriangleMesh& surface,
+                                                 std::span<const float> accuracy_mm,
+                                                 const TriangleMesh& truth, int threads) {
+  struct Vertex {
+    double stated_mm = 0.0;
+    double off_mm = 0.0;
+  };
+  std::vector<Vertex> vertices(accuracy_mm.size());
+  const TriangleBvh tree(truth);
+  const auto count = static_cast<int>(vertices.size());
+  parallel_for((count + kBatch - 1) / kBatch, threads, [&](int batch) {
+    for (int v = batch * kBatch; v < std::min(count, (batch + 1) * kBatch); ++v) {
+      vertices[v] = {accuracy_mm[v], tree.closest(surface.vertices.row(v)).distance_mm};
+    }
+  });
+  std::erase_if(vertices, [](const Vertex& vertex) { return vertex.stated_mm <= 0.0; });
+  std::ranges::sort(vertices, {}, &Vertex::stated_mm);
+  std::array<EstimatedAccuracy, 5> fifths;
+  for (std::size_t k = 0; k < fifths.size(); ++k) {
+    const std::span<Vertex> fifth =
+        std::span(vertices).subspan(k * vertices.size() / 5, vertices.size() / 5);
+    if (fifth.empty()) continue;
+    const auto within = std::ranges::count_if(
+        fifth, [](const Vertex& vertex) { return vertex.off_mm < 2.0 * vertex.stated_mm; });
+    fifths[k].estimate_mm = fifth[fifth.size() / 2].stated_mm;
+    fifths[k].within_twice_percent =
+        100.0 * static_cast<double>(within) / static_cast<double>(fifth.size());
+    std::ranges::sort(fifth, {}, &Vertex::off_mm);
+    fifths[k].error_mm = 1.4826 * fifth[fifth.size() / 2].off_mm;
+  }
+  return fifths;
+}
+
 }  // namespace skullstation

@@ -34,4 +34,17 @@ struct SurfaceMeasures {
 Result<SurfaceMeasures> measure_surface(const TriangleMesh& surface, const TriangleMesh& truth,
                                         std::span<const StereoView> views, int threads);
 
+/// A fifth of a surface's vertices.
+struct EstimatedAccuracy {
+  double estimate_mm = 0.0;           ///< median of the stated standard errors
+  double error_mm = 0.0;              ///< 1.4826 times the median distance from the truth
+  double within_twice_percent = 0.0;  ///< lie less than two stated standard errors off the truth
+};
+
+/// Does a vertex's stated accuracy tell how far off it is? By the statement, the best fifth first;
+/// vertices without one (0) are left out.
+std::array<EstimatedAccuracy, 5> check_estimates(const TriangleMesh& surface,
+                                                 std::span<const float> accuracy_mm,
+                                                 const TriangleMesh& truth, int threads);
+
 }  // namespace skullstation

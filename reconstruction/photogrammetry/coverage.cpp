@@ -1,7 +1,6 @@
 #include "reconstruction/photogrammetry/coverage.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <utility>
 
@@ -45,37 +44,24 @@ void for_each_vertex(const TriangleMesh& mesh, int threads, const std::function<
 
 }  // namespace
 
-Coverage measure_coverage(const TriangleMesh& mesh, const Sights& sights, double match_sd_px,
-                          int threads) {
+Coverage measure_coverage(const TriangleMesh& mesh, const Sights& sights,
+                          std::vector<float> accuracy_mm, int threads) {
   const std::span<const StereoView> views = sights.views();
   const auto count = static_cast<std::size_t>(mesh.vertices.rows());
   Coverage coverage{std::vector<std::uint8_t>(count, 0), std::vector<float>(count, 0.0f),
-                    std::vector<float>(count, 0.0f), border_mm(mesh)};
+                    std::move(accuracy_mm), border_mm(mesh)};
   for_each_vertex(mesh, threads, [&](int i) {
-    const Eigen::Vector3d point = mesh.vertices.row(i);
-    const Eigen::Vector3d normal = mesh.normals.row(i);
-    std::vector<Eigen::Vector3d> directions;
+    int seen = 0;
     double finest = 0.0;
     for (std::size_t v = 0; v < views.size(); ++v) {
-      const auto sight = sights.of(v, point, normal);
+      const auto sight = sights.of(v, mesh.vertices.row(i), mesh.normals.row(i));
       if (!sight) continue;
-      directions.push_back(sight->direction);
+      ++seen;
       const double pixel_mm = sight->depth_mm / views[v].camera.fx;
       finest = finest == 0.0 ? pixel_mm : std::min(finest, pixel_mm);
     }
-    coverage.views[i] = static_cast<std::uint8_t>(std::min<std::size_t>(directions.size(), 255));
+    coverage.views[i] = static_cast<std::uint8_t>(std::min(seen, 255));
     coverage.ground_sample_mm[i] = static_cast<float>(finest);
-    double least_cosine = 1.0;
-    for (std::size_t a = 0; a < directions.size(); ++a) {
-      for (std::size_t b = a + 1; b < directions.size(); ++b) {
-        least_cosine = std::min(least_cosine, directions[a].dot(directions[b]));
-      }
-    }
-    if (directions.size() < 2) return;
-    const double half_angle = 0.5 * std::acos(std::clamp(least_cosine, -1.0, 1.0));
-    const double spread = 2.0 * std::max(std::tan(half_angle), 1e-3);
-    coverage.accuracy_mm[i] = static_cast<float>(
-        finest * match_sd_px / (spread * std::sqrt(static_cast<double>(directions.size()))));
   });
   return coverage;
 }

@@ -7,6 +7,7 @@
 
 #include "reconstruction/mesh/decimation.h"
 #include "reconstruction/mesh/hole_filling.h"
+#include "reconstruction/photogrammetry/depth_scatter.h"
 #include "reconstruction/photogrammetry/surface_colors.h"
 #include "reconstruction/photogrammetry/surface_extraction.h"
 #include "reconstruction/photogrammetry/visual_hull.h"
@@ -104,9 +105,6 @@ Result<void> SurfaceOptions::validate() const {
   if (!(closed_rim_mm >= 0.0)) {
     return fail(ErrorKind::usage, "surface options", "a rim can't be shorter than 0 mm");
   }
-  if (!(match_sd_px > 0.0)) {
-    return fail(ErrorKind::usage, "surface options", "match_sd_px must be positive");
-  }
   return {};
 }
 
@@ -154,7 +152,6 @@ Result<ReconstructedSurface> surface_of_depths(std::vector<DepthMap> maps,
   }
   options.after_stage("surface");
   ReconstructedSurface result;
-  maps = {};  // gigabytes that nothing needs any more
   // What lies this little behind the nearest surface may be that surface itself.
   const double gap_mm = fusion.voxel_mm * fusion.truncation_voxels;
   result.mesh = thinned(std::move(surface.mesh), options.edge_mm, fusion.voxel_mm);
@@ -166,12 +163,14 @@ Result<ReconstructedSurface> surface_of_depths(std::vector<DepthMap> maps,
       result.filled = close_openings(result.mesh, options.closed_rim_mm);
       options.after_stage("closed openings");
     }
+    std::vector<float> accuracy_mm = depth_scatter(result.mesh, maps, gap_mm, options.threads);
+    maps = {};  // gigabytes that nothing needs any more
+    options.after_stage("accuracy");
     result.mesh.colors =
         SurfaceColors(result.mesh, sights, options.threads).vertex_colors(options.threads);
     options.after_stage("colours");
-    const double match_sd_px =
-        options.match_sd_px * static_cast<double>(1 << options.depth.finest_level);
-    result.coverage = measure_coverage(result.mesh, sights, match_sd_px, options.threads);
+    result.coverage =
+        measure_coverage(result.mesh, sights, std::move(accuracy_mm), options.threads);
     take_out_guesses(result.filled, result.coverage);
     options.after_stage("coverage");
   }

@@ -36,8 +36,6 @@ struct SurfaceOptions {
   /// no texture.
   std::optional<TextureOptions> texture = TextureOptions{};
   double textured_edge_voxels = 2.0;
-  /// Standard deviation of a match [px of the depth maps]; for the estimated accuracy.
-  double match_sd_px = 0.3;
   int threads = 0;  ///< 0: all; for every stage
   /// Told after each stage; for whoever measures.
   std::function<void(std::string_view stage)> after_stage = [](std::string_view) {};

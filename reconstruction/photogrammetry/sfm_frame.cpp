@@ -57,7 +57,7 @@ Eigen::Vector3d looked_at(const std::vector<Rigid3>& cameras) {
     normal += across;
     right += across * back.translation;
   }
-  return normal.completeOrthogonalDecomposition().solve(right);
+  return least_squares(normal, right);
 }
 
 }  // namespace
@@ -119,7 +119,7 @@ Similarity3 frame_of_cameras(const std::vector<Rigid3>& camera_from_model, doubl
   }
   Similarity3 frame;
   frame.scale = distance * static_cast<double>(camera_from_model.size()) / sum;
-  frame.rotation = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  frame.rotation = shortest_rotation(up, Eigen::Vector3d::UnitZ());
   frame.translation = -frame.scale * (frame.rotation * target);
   return frame;
 }

@@ -7,6 +7,7 @@
 
 #include "core/units.h"
 #include "reconstruction/photogrammetry/coverage.h"
+#include "reconstruction/photogrammetry/depth_scatter.h"
 #include "reconstruction/photogrammetry/exposure_gains.h"
 #include "reconstruction/photogrammetry/mesh_depth.h"
 #include "reconstruction/photogrammetry/texture_charts.h"
@@ -189,15 +190,38 @@ TEST(Coverage, CountsTheViewsAndTheBorder) {
   const BallScene scene;
   const auto views = photograph(scene);
   const TriangleMesh mesh = ball_mesh(scene, 20);
-  const Coverage coverage = measure_coverage(mesh, Sights(mesh, views, 1.0, 1), 0.3, 1);
+  const Coverage coverage = measure_coverage(mesh, Sights(mesh, views, 1.0, 1), {}, 1);
   // 18 views in a ring: a point of the equator is seen by those less than 80 deg away.
   const int equator = 10 * 40;
   EXPECT_GE(coverage.views[equator], 5);
   EXPECT_LE(coverage.views[equator], 9);
   EXPECT_NEAR(coverage.ground_sample_mm[equator], 230.0 / 420.0, 0.02);
-  EXPECT_GT(coverage.accuracy_mm[equator], 0.0f);
   // Two circles of latitude 80 deg.
   EXPECT_NEAR(coverage.open_edge_mm, 2.0 * 6.283 * 30.0 * std::cos(radians(80.0)), 1.0);
+}
+
+TEST(DepthScatter, IsHowFarTheViewsDepthsLieFromTheSurface) {
+  const BallScene scene;
+  const auto views = photograph(scene);
+  auto maps = true_depth_maps(scene, views);
+  const TriangleMesh mesh = ball_mesh(scene);
+  const int equator = 20 * 80;
+  const auto exact = depth_scatter(mesh, maps, 2.0, 1);
+  EXPECT_LT(exact[equator], 0.05f);
+  EXPECT_EQ(exact[0], 0.0f) << "no view sees the ball from below";
+
+  for (std::size_t m = 0; m < maps.size(); ++m) {
+    // 0.46 mm before the surface in one view, behind it in the next, where it faces the camera.
+    const float nearer = m % 2 == 0 ? 1.002f : 0.998f;
+    for (InversePlane& plane : maps[m].planes) {
+      plane = {nearer * plane.w, nearer * plane.gx, nearer * plane.gy};
+    }
+  }
+  const auto off = depth_scatter(mesh, maps, 2.0, 1);
+  EXPECT_GT(off[equator], 1.4826f * 0.46f * 0.5f);
+  EXPECT_LT(off[equator], 1.4826f * 0.46f);
+  EXPECT_EQ(depth_scatter(mesh, maps, 2.0, 3), off);
+  EXPECT_EQ(depth_scatter(mesh, maps, 0.01, 1)[equator], 0.0f) << "none within reach";
 }
 
 }  // namespace
