@@ -16,18 +16,38 @@ endif()
 
 # What nearly every source includes of other people's headers is compiled once: a third of the time
 # of a small source. The preset `dev` goes without and so proves that each source includes what it
-# uses.
+# uses. JSON and CLI11 bring inline code that each source compiles again, precompiled or not: only
+# the outer folders (daemon, bench) have them.
 function(skullstation_precompile_words)
   file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/words.cpp CONTENT "")
-  add_library(skullstation_words OBJECT ${PROJECT_BINARY_DIR}/words.cpp)
-  target_link_libraries(skullstation_words
-    PRIVATE skullstation_build_flags Eigen3::Eigen Threads::Threads fmt::fmt
-            nlohmann_json::nlohmann_json)
-  target_include_directories(skullstation_words SYSTEM PRIVATE ${TL_EXPECTED_INCLUDE_DIR})
-  target_precompile_headers(skullstation_words PRIVATE
-    <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <algorithm> <array> <chrono> <cmath>
-    <filesystem> <fmt/format.h> <functional> <map> <memory> <nlohmann/json.hpp> <optional> <span>
-    <string> <tl/expected.hpp> <utility> <vector>)
+  set(words <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <algorithm> <array> <chrono>
+            <cmath> <filesystem> <fmt/format.h> <functional> <map> <memory> <optional> <span> <string>
+            <tl/expected.hpp> <utility> <vector>)
+  foreach(name skullstation_words skullstation_outer_words)
+    add_library(${name} OBJECT ${PROJECT_BINARY_DIR}/words.cpp)
+    target_link_libraries(${name}
+      PRIVATE skullstation_build_flags Eigen3::Eigen Threads::Threads fmt::fmt)
+    target_include_directories(${name} SYSTEM PRIVATE ${TL_EXPECTED_INCLUDE_DIR})
+    target_precompile_headers(${name} PRIVATE ${words})
+  endforeach()
+  target_compile_options(skullstation_outer_words PRIVATE ${SKULLSTATION_OUTER_OPTIONS})
+  target_link_libraries(skullstation_outer_words
+    PRIVATE nlohmann_json::nlohmann_json CLI11::CLI11)
+  target_precompile_headers(skullstation_outer_words PRIVATE <CLI/CLI.hpp> <nlohmann/json.hpp>)
+endfunction()
+
+# What the outer folders and the tests do themselves is quick; what they call is compiled for speed.
+set(SKULLSTATION_OUTER_OPTIONS $<$<CONFIG:Release>:-O1>)
+
+# What the folder that is being read is compiled with; the outer folders set it to `outer_words`.
+set(SKULLSTATION_WORDS words)
+function(skullstation_compile_as_folder target)
+  if(SKULLSTATION_WORDS STREQUAL outer_words)
+    target_compile_options(${target} PRIVATE ${SKULLSTATION_OUTER_OPTIONS})
+  endif()
+  if(SKULLSTATION_PCH)
+    target_precompile_headers(${target} REUSE_FROM skullstation_${SKULLSTATION_WORDS})
+  endif()
 endfunction()
 
 # skullstation_library(NAME SOURCES a.cpp ... [PUBLIC targets ...] [PRIVATE targets ...]
@@ -42,16 +62,22 @@ function(skullstation_library name)
   target_link_libraries(skullstation_${name}
     PUBLIC skullstation_build_flags ${ARG_PUBLIC}
     PRIVATE ${ARG_PRIVATE} fmt::fmt)
-  if(SKULLSTATION_PCH AND NOT ARG_WITHOUT_WORDS)
-    target_precompile_headers(skullstation_${name} REUSE_FROM skullstation_words)
+  if(NOT ARG_WITHOUT_WORDS)
+    skullstation_compile_as_folder(skullstation_${name})
   endif()
   if(SKULLSTATION_SANITIZE AND ARG_UNSANITIZED)
     target_compile_options(skullstation_${name} PRIVATE -fno-sanitize=all)
   endif()
 endfunction()
 
-# What tests do themselves is quick; what they test is compiled as it ships.
-set(SKULLSTATION_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
+# skullstation_program(NAME SOURCES a.cpp ... [LINK targets ...])
+# makes the program NAME.
+function(skullstation_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE skullstation_build_flags ${ARG_LINK} fmt::fmt)
+  skullstation_compile_as_folder(${name})
+endfunction()
 
 # skullstation_test(NAME SOURCES a_test.cpp ... [LINK targets ...] [LABEL unit] [TIMEOUT s]
 #                   [ONE_PROCESS])
@@ -67,7 +93,7 @@ function(skullstation_test name)
     set(ARG_TIMEOUT 600)
   endif()
   add_executable(${name} ${ARG_SOURCES})
-  target_compile_options(${name} PRIVATE ${SKULLSTATION_TEST_OPTIONS})
+  target_compile_options(${name} PRIVATE ${SKULLSTATION_OUTER_OPTIONS})
   target_precompile_headers(${name} REUSE_FROM skullstation_test_words)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} skullstation::test_support GTest::gmock_main)
   if(ARG_ONE_PROCESS)
