@@ -14,6 +14,8 @@ namespace {
 constexpr int kBatch = 4096;
 /// A normal distribution's standard deviation for a median absolute deviation of 1.
 constexpr double kSdPerMedian = 1.4826;
+/// The surface's error for a standard deviation of 1 of the views' depths about it.
+constexpr double kErrorPerScatter = 2.0;
 
 /// From the point along its normal to what the map holds there; nothing where it doesn't look at
 /// that side of the surface or holds no depth.
@@ -55,7 +57,7 @@ std::vector<float> depth_scatter(const TriangleMesh& mesh, std::span<const Depth
       if (distances.size() < 2) continue;
       const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
       std::nth_element(distances.begin(), middle, distances.end());
-      scatter[static_cast<std::size_t>(v)] = static_cast<float>(kSdPerMedian * *middle);
+      scatter[static_cast<std::size_t>(v)] = static_cast<float>(kErrorPerScatter * kSdPerMedian * *middle);
     }
   });
   return scatter;

@@ -142,15 +142,18 @@ TEST(ReconstructSurface, MeasuresABall) {
   EXPECT_TRUE(is_oriented_manifold(surface->mesh));
   const auto& coverage = surface->coverage;
   ASSERT_EQ(coverage.views.size(), errors.size());
-  int well_seen = 0;
+  std::vector<float> stated;
   for (std::size_t v = 0; v < coverage.views.size(); ++v) {
     if (coverage.views[v] < 3) continue;
-    ++well_seen;
     EXPECT_NEAR(coverage.ground_sample_mm[v], 0.55, 0.1);
-    EXPECT_GT(coverage.accuracy_mm[v], 0.0f);
-    EXPECT_LT(coverage.accuracy_mm[v], 0.5f);
+    stated.push_back(coverage.accuracy_mm[v]);
   }
-  EXPECT_GT(well_seen, static_cast<int>(errors.size() * 9 / 10));
+  ASSERT_GT(stated.size(), errors.size() * 9 / 10);
+  std::sort(stated.begin(), stated.end());
+  EXPECT_GT(stated[stated.size() / 50], 0.0f) << "hardly any without a statement";
+  const double ratio = stated[stated.size() / 2] / (1.4826 * errors[errors.size() / 2]);
+  EXPECT_GT(ratio, 0.5);
+  EXPECT_LT(ratio, 2.0);
   EXPECT_GT(coverage.open_edge_mm, 20.0);
   EXPECT_EQ(surface->mesh.colors.rows(), surface->mesh.vertices.rows());
 }
