@@ -1,7 +1,7 @@
 // How far approximated faces lie from the true ones: phantoms that the model never saw, each method
 // beside the others, as Markdown tables (docs/faces.md). Usage:
-//   bench_faces [--model FILE] [--people 20] [--seed 5000] [--remains complete|no-mandible|
-//               no-calvaria|half-face]
+//   bench_faces [--model FILE] [--people 20] [--seed 5000] [--out FOLDER]
+//               [--remains complete|no-mandible|no-calvaria|half-face]
 // Depths are the model's population mean (the paper's method), foretold from the skull (the
 // default), the same with sex, age and body mass index known, and the person's own.
 
@@ -9,7 +9,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <filesystem>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "bench/seconds.h"
@@ -17,6 +19,7 @@
 #include "daemon/model/model_source.h"
 #include "reconstruction/approximation/face_error.h"
 #include "reconstruction/approximation/face_estimate.h"
+#include "reconstruction/io/ply.h"
 #include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/phantom/person.h"
 #include "reconstruction/statistics/tissue_thickness.h"
@@ -31,6 +34,7 @@ struct Options {
   int people = 20;
   std::uint64_t seed = 5000;
   std::string remains = "complete";
+  std::filesystem::path out;  ///< folder for the meshes; none if empty
 };
 
 Eigen::Vector3d landmark(const Person& person, std::string_view name) {
@@ -55,13 +59,15 @@ TriangleMesh remains_of(const Person& person, const std::string& remains) {
 
 struct Method {
   const char* name;
+  const char* file;
   TissueChoice tissue;
   bool facts;
 };
-constexpr Method methods[] = {{"mean depths (paper)", TissueChoice::population, false},
-                              {"given the skull (default)", TissueChoice::conditional, false},
-                              {"and sex, age, BMI", TissueChoice::conditional, true},
-                              {"the person's own depths", TissueChoice::measured, false}};
+constexpr Method methods[] = {
+    {"mean depths (paper)", "mean", TissueChoice::population, false},
+    {"given the skull (default)", "skull_given", TissueChoice::conditional, false},
+    {"and sex, age, BMI", "facts", TissueChoice::conditional, true},
+    {"the person's own depths", "own", TissueChoice::measured, false}};
 
 PersonFacts facts_of(const Person& person) {
   const PersonParameters& p = person.parameters;
@@ -132,6 +138,20 @@ Result<void> run(const Options& options) {
       face_s += (Seconds::now() - face_begin).processor;
       const FaceError error = face_error(model.head_template, face->head, face->band_mm, skin, 0);
       errors[method.name].push_back(error);
+      if (!options.out.empty()) {
+        const auto path = [&](const char* what) {
+          return options.out / fmt::format("{}_{}.ply", i + 1, what);
+        };
+        const TriangleMesh head{face->head, model.head_template.triangles, {}, {}};
+        const TriangleMesh bone = surface_of(
+            model.skull_template, skull->vertices.topRows(model.skull_template.boundary_count));
+        for (const auto& [mesh, name] : {std::pair(&head, method.file),
+                                         {&skin, "truth"},
+                                         {&bone, "skull"},
+                                         {&face->spheres, "spheres"}}) {
+          if (const auto written = write_ply(*mesh, path(name)); !written) return written;
+        }
+      }
       fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.0f} % |\n", i + 1, method.name,
                  error.mean_mm, error.p95_mm, error.over_bone_mean_mm, 100.0 * error.within_band);
     }
@@ -166,6 +186,7 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "of the people");
   app.add_option("--remains", options.remains, "what is left of the skulls")
       ->check(CLI::IsMember({"complete", "no-mandible", "no-calvaria", "half-face"}));
+  app.add_option("--out", options.out, "folder to write the meshes to");
   CLI11_PARSE(app, argc, argv);
   if (const auto done = skullstation::run(options); !done) {
     fmt::print(stderr, "{}\n", done.error().message());

@@ -8,7 +8,8 @@
 #include <iterator>
 
 #include "core/parallel.h"
-#include "reconstruction/registration/point_tree.h"
+#include "reconstruction/approximation/head_residual.h"
+#include "reconstruction/approximation/sphere_contacts.h"
 #include "reconstruction/statistics/head_from_skull.h"
 
 namespace skullstation {
@@ -20,13 +21,12 @@ using Eigen::Index;
 /// What the tissue model's modes leave over errs alike over a centimetre or two: all the face's
 /// vertices together tell no more of it than so many on their own.
 constexpr double independent_points = 300.0;
-/// Beyond this a vertex of the head does not belong to the bone below [mm].
-constexpr double max_gap_mm = 25.0;
-/// The way from bone to skin runs outwards from both.
-constexpr double least_cosine = 0.3;
+/// Foretold depths err alike over a centimetre or two: what one vertex's depth tells of its own.
+constexpr double correlated_share = 0.1;
+/// What the head model's modes leave over in people whom it has not seen.
+constexpr double residual_sd_mm = 2.0;
 constexpr double own_depth_sd_mm = 0.3;
 constexpr double least_depth_sd_mm = 0.5;
-constexpr int candidates = 150;
 
 bool rests_on_bone(HeadRegion region) {
   return region == HeadRegion::face || region == HeadRegion::scalp;
@@ -90,13 +90,8 @@ struct Depths {
 /// all depths share is not mistaken for knowledge. Solved in rounds, since which sphere it is
 /// depends on the head.
 HeadAndTissue drawn_to_spheres(const FaceModel& model, const HeadAndTissue& prior,
-                               const TriangleMesh& bone, const Depths& depths, int rounds,
-                               int threads) {
-  std::vector<Index> spheres;
-  for (Index v = 0; v < depths.mm.size(); ++v) {
-    if (!std::isnan(depths.mm[v])) spheres.push_back(v);
-  }
-  const PointTree tree(bone.vertices(spheres, Eigen::all));
+                               const SphereContacts& contacts, const TriangleMesh& bone,
+                               const Depths& depths, int rounds, int threads) {
   const Eigen::MatrixXd head_modes = model.head.scaled_modes();
   const Index tissue_modes = depths.per_sd.cols();
   const Index count = prior.both.mean.size();
@@ -108,29 +103,18 @@ HeadAndTissue drawn_to_spheres(const FaceModel& model, const HeadAndTissue& prio
   for (int round = 0; round < rounds; ++round) {
     const Points3 head = shape_at(model.head, state.both.mean.head(state.head_modes));
     const Points3 normals = vertex_normals({head, model.head_template.triangles, {}, {}});
-    const Eigen::VectorXd tissue = state.both.mean.tail(tissue_modes);
+    const Eigen::VectorXd radius_mm =
+        depths.mm + depths.per_sd * state.both.mean.tail(tissue_modes);
     Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(head_vertices, count);
     Eigen::VectorXd values = Eigen::VectorXd::Zero(head_vertices);
     Eigen::VectorXd weights = Eigen::VectorXd::Zero(head_vertices);
     parallel_for(head_vertices, threads, [&](int v) {
       if (!rests_on_bone(model.head_template.region[static_cast<std::size_t>(v)])) return;
-      const Eigen::Vector3d at = head.row(v);
-      Index nearest = -1;
-      double least_gap = max_gap_mm;
-      for (const NearPoint& near : tree.nearest(at, candidates)) {
-        const Index sphere = spheres[static_cast<std::size_t>(near.index)];
-        const double radius = depths.mm[sphere] + depths.per_sd.row(sphere).dot(tissue);
-        const double gap = std::sqrt(near.squared_distance) - radius;
-        if (gap < least_gap) {
-          least_gap = gap;
-          nearest = sphere;
-        }
-      }
-      if (nearest < 0) return;
+      const auto contact = contacts.of(head.row(v), normals.row(v), radius_mm);
+      if (!contact) return;
+      const Index nearest = contact->sphere;
+      const Eigen::Vector3d& way = contact->way;
       const Eigen::Vector3d from = bone.vertices.row(nearest);
-      const Eigen::Vector3d way = (at - from).normalized();
-      if (way.dot(normals.row(v)) < least_cosine || way.dot(bone.normals.row(nearest)) < 0.0)
-        return;
       // way . head(b) - radius(z) = way . bone, linear in both.
       rows.row(v).head(state.head_modes) = way.transpose() * head_modes.middleRows<3>(3 * Index{v});
       rows.row(v).tail(tissue_modes) = -depths.per_sd.row(nearest);
@@ -147,6 +131,36 @@ HeadAndTissue drawn_to_spheres(const FaceModel& model, const HeadAndTissue& prio
     state.both.covariance = factor.solve(Eigen::MatrixXd::Identity(count, count));
   }
   return state;
+}
+
+/// The head moved on along its normals, from its model's modes towards the spheres. `own_share`:
+/// what of a vertex's information is its own. In rounds, since which sphere it is depends on the
+/// head.
+Points3 bent_to_spheres(const FaceModel& model, const Points3& drawn,
+                        const SphereContacts& contacts, const Eigen::VectorXd& radius_mm,
+                        const Eigen::VectorXd& radius_sd_mm, double own_share, int rounds,
+                        int threads) {
+  const Triangles& triangles = model.head_template.triangles;
+  const Points3 along = vertex_normals({drawn, triangles, {}, {}});
+  Eigen::VectorXd shift = Eigen::VectorXd::Zero(drawn.rows());
+  Points3 head = drawn;
+  for (int round = 0; round < rounds; ++round) {
+    const Points3 normals = vertex_normals({head, triangles, {}, {}});
+    std::vector<WantedShift> wanted(static_cast<std::size_t>(head.rows()));
+    parallel_for(static_cast<int>(head.rows()), threads, [&](int v) {
+      if (!rests_on_bone(model.head_template.region[static_cast<std::size_t>(v)])) return;
+      const auto contact = contacts.of(head.row(v), normals.row(v), radius_mm);
+      if (!contact) return;
+      const double cosine = contact->way.dot(along.row(v));
+      if (cosine <= 0.0) return;
+      const double sd = std::max(radius_sd_mm[contact->sphere], least_depth_sd_mm);
+      wanted[static_cast<std::size_t>(v)] = {shift[v] - contact->gap_mm / cosine,
+                                             own_share * cosine * cosine / (sd * sd)};
+    });
+    shift = residual_shift_mm(triangles, wanted, residual_sd_mm);
+    head = drawn + shift.asDiagonal() * along;
+  }
+  return head;
 }
 
 /// How the head follows a variable of the joint model when what is known stays as it is.
@@ -253,9 +267,15 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
 
   progress.report(0.5, "head");
   depths.mm = smoothed_depths(bone, depths.mm, options.spheres.smoothing_mm);
-  face.belief =
-      drawn_to_spheres(model, prior, bone, depths, options.rounds, options.threads).head();
-  face.head = shape_at(model.head, face.belief.mean);
+  const SphereContacts contacts(bone, depths.mm);
+  const HeadAndTissue drawn =
+      drawn_to_spheres(model, prior, contacts, bone, depths, options.rounds, options.threads);
+  const Eigen::VectorXd radius_mm =
+      depths.mm + depths.per_sd * drawn.both.mean.tail(depths.per_sd.cols());
+  const bool known = options.tissue != TissueChoice::conditional;
+  face.head = bent_to_spheres(model, shape_at(model.head, drawn.head().mean), contacts, radius_mm,
+                              depths.sd_mm, known ? 1.0 : correlated_share, options.rounds,
+                              options.threads);
   const Points3 normals = vertex_normals({face.head, model.head_template.triangles, {}, {}});
   // The bands were calibrated on what the joint model foretells from the skull; how much narrower
   // the spheres make them is not known from left-out subjects, so that it is not claimed.

@@ -52,7 +52,6 @@ struct FaceEstimate {
   Eigen::VectorXd tissue_sd_mm;  ///< same
   TriangleMesh spheres;
   Points3 head;                 ///< head template's vertices x 3
-  Belief belief;                ///< about the head model's coefficients
   Eigen::VectorXd sd_mm;        ///< head vertices: along the normal
   Eigen::VectorXd band_mm;      ///< half width of the calibrated 80 % band
   std::vector<bool> from_bone;  ///< head vertices whose depth over bone carries them; the others

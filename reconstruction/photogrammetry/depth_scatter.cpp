@@ -57,7 +57,8 @@ std::vector<float> depth_scatter(const TriangleMesh& mesh, std::span<const Depth
       if (distances.size() < 2) continue;
       const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
       std::nth_element(distances.begin(), middle, distances.end());
-      scatter[static_cast<std::size_t>(v)] = static_cast<float>(kErrorPerScatter * kSdPerMedian * *middle);
+      scatter[static_cast<std::size_t>(v)] =
+          static_cast<float>(kErrorPerScatter * kSdPerMedian * *middle);
     }
   });
   return scatter;
