@@ -46,4 +46,12 @@ tl::unexpected<Error> forward(const tl::expected<T, Error>& failed) {
   return tl::unexpected<Error>(failed.error());
 }
 
+/// The same for what happened to a file's content, named before the place in it.
+template <class T>
+tl::unexpected<Error> forward(const std::string& file, const tl::expected<T, Error>& failed) {
+  Error error = failed.error();
+  error.where = file + ", " + error.where;
+  return tl::unexpected<Error>(std::move(error));
+}
+
 }  // namespace skullstation

@@ -51,7 +51,7 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   fit_options.seed = common.seed;
   fit_options.threads = common.threads;
   const auto skull = fit_case_skull(model, *input, fit_options, progress.part(0.05, 0.6));
-  if (!skull) return forward(skull);
+  if (!skull) return forward(command.skull.string(), skull);
   const auto face = estimate_face(model, *skull, options, progress.part(0.6, 0.75));
   if (!face) return forward(face);
   if (const auto written = write_case_folder(model, *skull, *face, source, command.out,

@@ -99,7 +99,7 @@ Result<CommandReport> run(const FitSkullCommand& command, const CommonOptions& c
   options.seed = common.seed;
   options.threads = common.threads;
   const auto fit = register_skull(templates->skull, *input, options, progress);
-  if (!fit) return forward(fit);
+  if (!fit) return forward(command.mesh.string(), fit);
 
   const SkullFitQuality& quality = fit->quality;
   const Json json = {{"format", "skullstation-fit/1"},
@@ -145,7 +145,7 @@ Result<CommandReport> run(const FitHeadCommand& command, const CommonOptions& co
   options.seed = common.seed;
   options.threads = common.threads;
   const auto fit = register_head(templates->head, *input, options, progress);
-  if (!fit) return forward(fit);
+  if (!fit) return forward(command.mesh.string(), fit);
 
   const HeadFitQuality& quality = fit->quality;
   const Json json = {{"format", "skullstation-fit/1"},

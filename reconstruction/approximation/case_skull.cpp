@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "reconstruction/registration/similarity_fit.h"
@@ -17,6 +18,9 @@ constexpr double observed_sd_mm = 0.5;
 constexpr double strange = 3.0;
 constexpr double too_strange = 8.0;
 constexpr double least_observed_share = 0.15;
+/// Mean distance of what was scanned from the fitted template: one skull fits to half a millimetre.
+constexpr double doubtful_mm = 1.5;
+constexpr double too_far_mm = 5.0;
 
 }  // namespace
 
@@ -34,6 +38,12 @@ Result<CaseSkull> fit_case_skull(const FaceModel& model, const TriangleMesh& inp
     return fail(ErrorKind::bad_input, "input skull",
                 fmt::format("shows only {:.0f} % of a skull's outside", 100.0 * share),
                 "scan more of it");
+  }
+  const double off_mm = std::max(fit->quality.outer.mean_mm, fit->quality.facial.mean_mm);
+  if (off_mm > too_far_mm) {
+    return fail(ErrorKind::bad_input, "input skull",
+                fmt::format("lies {:.0f} mm from the fitted template on average", off_mm),
+                "give one adult human skull and nothing else");
   }
 
   // Pose against what the model makes of the shape, in turns: size is kept, since it tells.
@@ -80,6 +90,12 @@ Result<CaseSkull> fit_case_skull(const FaceModel& model, const TriangleMesh& inp
         fmt::format("The skull lies {:.1f} standard deviations from those that the model was made "
                     "from: the face is doubtful.",
                     result.strangeness));
+  }
+  if (off_mm > doubtful_mm) {
+    result.warnings.push_back(fmt::format(
+        "What was scanned lies {:.1f} mm from the fitted skull on average: other objects "
+        "are in the scan, or the face is doubtful.",
+        off_mm));
   }
   if (share < 0.9) {
     result.warnings.push_back(fmt::format(

@@ -22,6 +22,11 @@ TEST(Result, AnErrorIsHandedOnWhole) {
   EXPECT_EQ(half_as_text(3).error().message(), "--n: must be even; try 2");
 }
 
+TEST(Result, AnErrorOfAFilesContentNamesTheFile) {
+  EXPECT_EQ(forward("numbers.txt", half(3)).value().message(),
+            "numbers.txt, --n: must be even; try 2");
+}
+
 TEST(Error, EmptyPartsLeaveNoPunctuation) {
   EXPECT_EQ((Error{ErrorKind::cancelled, "", "stopped", ""}.message()), "stopped");
 }
