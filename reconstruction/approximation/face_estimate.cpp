@@ -18,15 +18,15 @@ namespace {
 
 using Eigen::Index;
 
-/// What the tissue model's modes leave over errs alike over a centimetre or two: all the face's
-/// vertices together tell no more of it than so many on their own.
+/// Depths err alike over a centimetre or two: all the face's vertices together tell of the head's
+/// modes no more than so many on their own.
 constexpr double independent_points = 300.0;
-/// Foretold depths err alike over a centimetre or two: what one vertex's depth tells of its own.
-constexpr double correlated_share = 0.1;
+/// How closely the head keeps to the spheres.
+constexpr double contact_sd_mm = 0.5;
 /// What the head model's modes leave over in people whom it has not seen.
 constexpr double residual_sd_mm = 2.0;
+/// Of depths that were measured on the person.
 constexpr double own_depth_sd_mm = 0.3;
-constexpr double least_depth_sd_mm = 0.5;
 
 bool rests_on_bone(HeadRegion region) {
   return region == HeadRegion::face || region == HeadRegion::scalp;
@@ -78,68 +78,53 @@ HeadAndTissue updated(const TissueModel& tissue, HeadAndTissue state,
   return state;
 }
 
-/// Depths over the bone as the head's fit sees them.
-struct Depths {
-  Eigen::VectorXd mm;      ///< skull surface vertices; NaN: no sphere
-  Eigen::VectorXd sd_mm;   ///< what the tissue's coefficients leave over
-  Eigen::MatrixXd per_sd;  ///< vertices x #tissue modes: change for each standard deviation [mm]
-};
+/// What is believed of the head's modes once every vertex over bone is to lie on the surface of the
+/// sphere that reaches nearest to it. Solved in rounds, since which sphere it is depends on the
+/// head.
+Belief drawn_to_spheres(const FaceModel& model, const Belief& prior, const SphereContacts& contacts,
+                        const TriangleMesh& bone, const Eigen::VectorXd& radius_mm, int rounds,
+                        int threads) {
+  const Eigen::MatrixXd modes = model.head.scaled_modes();
+  const Index count = prior.mean.size();
+  const auto vertices = static_cast<int>(model.head.vertex_count());
+  const Eigen::MatrixXd prior_information =
+      Eigen::LLT<Eigen::MatrixXd>(prior.covariance).solve(Eigen::MatrixXd::Identity(count, count));
+  const double contact_information =
+      1.0 / (contact_sd_mm * contact_sd_mm + model.head.noise_variance);
 
-/// Each vertex of the head over bone lies on the surface of the sphere that reaches nearest to it,
-/// as far as its radius is known: head and radii are estimated together, so that an error which
-/// all depths share is not mistaken for knowledge. Solved in rounds, since which sphere it is
-/// depends on the head.
-HeadAndTissue drawn_to_spheres(const FaceModel& model, const HeadAndTissue& prior,
-                               const SphereContacts& contacts, const TriangleMesh& bone,
-                               const Depths& depths, int rounds, int threads) {
-  const Eigen::MatrixXd head_modes = model.head.scaled_modes();
-  const Index tissue_modes = depths.per_sd.cols();
-  const Index count = prior.both.mean.size();
-  const auto head_vertices = static_cast<int>(model.head.vertex_count());
-  const Eigen::MatrixXd prior_information = Eigen::LLT<Eigen::MatrixXd>(prior.both.covariance)
-                                                .solve(Eigen::MatrixXd::Identity(count, count));
-
-  HeadAndTissue state = prior;
+  Belief belief = prior;
   for (int round = 0; round < rounds; ++round) {
-    const Points3 head = shape_at(model.head, state.both.mean.head(state.head_modes));
+    const Points3 head = shape_at(model.head, belief.mean);
     const Points3 normals = vertex_normals({head, model.head_template.triangles, {}, {}});
-    const Eigen::VectorXd radius_mm =
-        depths.mm + depths.per_sd * state.both.mean.tail(tissue_modes);
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(head_vertices, count);
-    Eigen::VectorXd values = Eigen::VectorXd::Zero(head_vertices);
-    Eigen::VectorXd weights = Eigen::VectorXd::Zero(head_vertices);
-    parallel_for(head_vertices, threads, [&](int v) {
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(vertices, count);
+    Eigen::VectorXd values = Eigen::VectorXd::Zero(vertices);
+    Eigen::VectorXd weights = Eigen::VectorXd::Zero(vertices);
+    parallel_for(vertices, threads, [&](int v) {
       if (!rests_on_bone(model.head_template.region[static_cast<std::size_t>(v)])) return;
       const auto contact = contacts.of(head.row(v), normals.row(v), radius_mm);
       if (!contact) return;
-      const Index nearest = contact->sphere;
+      // way . head(b) = way . bone + radius, linear in b.
       const Eigen::Vector3d& way = contact->way;
-      const Eigen::Vector3d from = bone.vertices.row(nearest);
-      // way . head(b) - radius(z) = way . bone, linear in both.
-      rows.row(v).head(state.head_modes) = way.transpose() * head_modes.middleRows<3>(3 * Index{v});
-      rows.row(v).tail(tissue_modes) = -depths.per_sd.row(nearest);
-      values[v] =
-          way.dot(from) + depths.mm[nearest] - way.dot(model.head.mean.segment<3>(3 * Index{v}));
-      const double sd = std::max(depths.sd_mm[nearest], least_depth_sd_mm);
-      weights[v] = 1.0 / (sd * sd + model.head.noise_variance);
+      rows.row(v) = way.transpose() * modes.middleRows<3>(3 * Index{v});
+      values[v] = way.dot(bone.vertices.row(contact->sphere)) + radius_mm[contact->sphere] -
+                  way.dot(model.head.mean.segment<3>(3 * Index{v}));
+      weights[v] = contact_information;
     });
     const double seen = static_cast<double>((weights.array() > 0.0).count());
     weights *= std::min(1.0, independent_points / std::max(1.0, seen));
     const Eigen::MatrixXd weighted = rows.transpose() * weights.asDiagonal();
     const Eigen::LLT<Eigen::MatrixXd> factor(prior_information + weighted * rows);
-    state.both.mean = factor.solve(prior_information * prior.both.mean + weighted * values);
-    state.both.covariance = factor.solve(Eigen::MatrixXd::Identity(count, count));
+    belief.mean = factor.solve(prior_information * prior.mean + weighted * values);
+    belief.covariance = factor.solve(Eigen::MatrixXd::Identity(count, count));
   }
-  return state;
+  return belief;
 }
 
-/// The head moved on along its normals, from its model's modes towards the spheres. `own_share`:
-/// what of a vertex's information is its own. In rounds, since which sphere it is depends on the
-/// head.
+/// The head moved on along its normals, from its model's modes towards the spheres. In rounds,
+/// since which sphere it is depends on the head.
 Points3 bent_to_spheres(const FaceModel& model, const Points3& drawn,
                         const SphereContacts& contacts, const Eigen::VectorXd& radius_mm,
-                        const Eigen::VectorXd& radius_sd_mm, double own_share, int rounds,
-                        int threads) {
+                        int rounds, int threads) {
   const Triangles& triangles = model.head_template.triangles;
   const Points3 along = vertex_normals({drawn, triangles, {}, {}});
   Eigen::VectorXd shift = Eigen::VectorXd::Zero(drawn.rows());
@@ -153,9 +138,8 @@ Points3 bent_to_spheres(const FaceModel& model, const Points3& drawn,
       if (!contact) return;
       const double cosine = contact->way.dot(along.row(v));
       if (cosine <= 0.0) return;
-      const double sd = std::max(radius_sd_mm[contact->sphere], least_depth_sd_mm);
       wanted[static_cast<std::size_t>(v)] = {shift[v] - contact->gap_mm / cosine,
-                                             own_share * cosine * cosine / (sd * sd)};
+                                             cosine * cosine / (contact_sd_mm * contact_sd_mm)};
     });
     shift = residual_shift_mm(triangles, wanted, residual_sd_mm);
     head = drawn + shift.asDiagonal() * along;
@@ -217,19 +201,14 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
   const Belief belief = foretold(model.joint, skull.belief, options.facts);
 
   progress.report(0.0, "tissue");
-  const Index tissue_modes = model.tissue.mode_count();
-  HeadAndTissue prior{population_belief(model.head), model.head.mode_count()};
-  Depths depths;
+  Belief prior = population_belief(model.head);
   switch (options.tissue) {
     case TissueChoice::conditional: {
-      prior = updated(model.tissue, jointly(model, belief), options.known_depths);
-      const Belief tissue = prior.tissue();
-      face.tissue_mm = expected_tissue(model.tissue, tissue);
-      face.tissue_sd_mm = tissue_sd_mm(model.tissue, tissue);
-      // Linear round the expected depths: the logarithm's modes times the depth.
-      depths.per_sd = face.tissue_mm.asDiagonal() * model.tissue.modes;
-      depths.mm = face.tissue_mm - depths.per_sd * tissue.mean;
-      depths.sd_mm = face.tissue_mm.cwiseProduct(model.tissue.noise_sd);
+      const HeadAndTissue foreseen =
+          updated(model.tissue, jointly(model, belief), options.known_depths);
+      prior = foreseen.head();
+      face.tissue_mm = expected_tissue(model.tissue, foreseen.tissue());
+      face.tissue_sd_mm = tissue_sd_mm(model.tissue, foreseen.tissue());
       break;
     }
     case TissueChoice::population:
@@ -242,23 +221,14 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
           options.measured_mm.array().isNaN().select(options.measured_mm, own_depth_sd_mm);
       break;
   }
-  if (options.tissue != TissueChoice::conditional) {
-    // The paper's way: the spheres are taken as they are.
-    depths = {face.tissue_mm, Eigen::VectorXd::Constant(surface_count, own_depth_sd_mm),
-              Eigen::MatrixXd(surface_count, 0)};
-  } else if (tissue_modes > 0) {
-    for (Index v = 0; v < depths.per_sd.rows(); ++v) {
-      if (std::isnan(depths.mm[v])) depths.per_sd.row(v).setZero();
-    }
-  }
 
   progress.report(0.2, "sphere model");
   const TriangleMesh bone = surface_of(model.skull_template, skull.vertices.topRows(surface_count));
   SphereModelOptions sphere_options = options.spheres;
   sphere_options.threads = options.threads;
-  auto spheres = sphere_model(bone.vertices,
-                              smoothed_depths(bone, face.tissue_mm, options.spheres.smoothing_mm),
-                              sphere_options);
+  const Eigen::VectorXd radius_mm =
+      smoothed_depths(bone, face.tissue_mm, options.spheres.smoothing_mm);
+  auto spheres = sphere_model(bone.vertices, radius_mm, sphere_options);
   if (!spheres) return forward(spheres);
   face.spheres = *std::move(spheres);
   if (progress.stop.stop_requested()) {
@@ -266,20 +236,15 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
   }
 
   progress.report(0.5, "head");
-  depths.mm = smoothed_depths(bone, depths.mm, options.spheres.smoothing_mm);
-  const SphereContacts contacts(bone, depths.mm);
-  const HeadAndTissue drawn =
-      drawn_to_spheres(model, prior, contacts, bone, depths, options.rounds, options.threads);
-  const Eigen::VectorXd radius_mm =
-      depths.mm + depths.per_sd * drawn.both.mean.tail(depths.per_sd.cols());
-  const bool known = options.tissue != TissueChoice::conditional;
-  face.head = bent_to_spheres(model, shape_at(model.head, drawn.head().mean), contacts, radius_mm,
-                              depths.sd_mm, known ? 1.0 : correlated_share, options.rounds,
-                              options.threads);
+  const SphereContacts contacts(bone, radius_mm);
+  const Belief drawn =
+      drawn_to_spheres(model, prior, contacts, bone, radius_mm, options.rounds, options.threads);
+  face.head = bent_to_spheres(model, shape_at(model.head, drawn.mean), contacts, radius_mm,
+                              options.rounds, options.threads);
   const Points3 normals = vertex_normals({face.head, model.head_template.triangles, {}, {}});
   // The bands were calibrated on what the joint model foretells from the skull; how much narrower
   // the spheres make them is not known from left-out subjects, so that it is not claimed.
-  face.sd_mm = sd_along_normals_mm(model.head, prior.head().covariance, normals);
+  face.sd_mm = sd_along_normals_mm(model.head, prior.covariance, normals);
   face.band_mm.resize(face.sd_mm.size());
   for (Index v = 0; v < face.sd_mm.size(); ++v) {
     const HeadRegion region = model.head_template.region[static_cast<std::size_t>(v)];
