@@ -2,14 +2,15 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <openssl/evp.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <fstream>
 #include <sstream>
 #include <system_error>
+
+#include "core/file_descriptor.h"
+#include "core/sha256.h"
 
 namespace skullstation {
 
@@ -17,48 +18,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::string reason(int error_number) { return std::system_category().message(error_number); }
-
-tl::unexpected<Error> write_error(const fs::path& path, int error_number) {
-  const std::string advice = error_number == ENOSPC ? "free some space on this volume"
-                             : error_number == EACCES || error_number == EROFS
-                                 ? "choose a folder that this user may write to"
-                                 : "";
-  return fail(ErrorKind::bad_input, path.string(),
-              fmt::format("can't be written ({})", reason(error_number)), advice);
-}
-
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int fd) : fd_(fd) {}
-  ~FileDescriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
-
 /// 0, or the errno of the step that failed.
 int write_and_sync(const fs::path& path, std::string_view bytes) {
   const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (file.get() < 0) return errno;
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    bytes.remove_prefix(static_cast<std::size_t>(written));
-  }
+  if (const int failure = write_all(file, bytes); failure != 0) return failure;
   return ::fsync(file.get()) == 0 ? 0 : errno;
-}
-
-int sync_folder(const fs::path& folder) {
-  const FileDescriptor handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (handle.get() < 0) return errno;
-  return ::fsync(handle.get()) == 0 ? 0 : errno;
 }
 
 }  // namespace
@@ -70,10 +35,7 @@ Result<std::string> read_file(const fs::path& path) {
   }
   errno = 0;
   std::ifstream in(path, std::ios::binary);
-  if (!in) {
-    return fail(ErrorKind::bad_input, path.string(),
-                fmt::format("can't be read ({})", reason(errno)));
-  }
+  if (!in) return read_error(path, errno);
   std::ostringstream bytes;
   bytes << in.rdbuf();
   if (in.bad()) return fail(ErrorKind::bad_input, path.string(), "reading stopped midway");
@@ -115,12 +77,9 @@ Result<std::uint64_t> free_space_bytes(const fs::path& folder) {
 }
 
 std::string sha256_hex(std::string_view bytes) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int size = 0;
-  EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr);
-  std::string hex;
-  for (unsigned int i = 0; i < size; ++i) hex += fmt::format("{:02x}", digest[i]);
-  return hex;
+  Sha256 sum;
+  sum.update(bytes);
+  return sum.finish();
 }
 
 }  // namespace skullstation

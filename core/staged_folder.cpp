@@ -1,25 +1,17 @@
 #include "core/staged_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <system_error>
 
 #include "core/file.h"
+#include "core/file_descriptor.h"
 
 namespace skullstation {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-void sync(const fs::path& folder) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
 
 fs::path without_trailing_slash(const fs::path& folder) {
   const fs::path absolute = fs::absolute(folder).lexically_normal();
@@ -47,7 +39,9 @@ Result<void> StagedFolder::put_in_place() {
   fs::rename(staged_, place_, error);
   if (error) return fail(ErrorKind::bad_input, place_.string(), error.message());
   done_ = true;
-  sync(place_.parent_path());
+  if (const int failure = sync_folder(place_.parent_path()); failure != 0) {
+    return write_error(place_, failure);
+  }
   return {};
 }
 

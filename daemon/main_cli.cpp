@@ -49,6 +49,65 @@ void add_surface_options(CLI::App& app, CtSurfaceOptions& o) {
       ->capture_default_str();
 }
 
+void add_evidence_commands(CLI::App& app, Command& chosen) {
+  constexpr const char* trust_help =
+      "PEM file of the station's (or its authority's) certificate or public key, got by another "
+      "way than the package";
+  add<PackageCommand>(
+      app, "package", "seal a case: checksums, provenance, signatures, audit entry", chosen,
+      [](CLI::App& package, PackageCommand& o) {
+        package.add_option("CASE", o.case_folder, "the case's folder")->required();
+        package.add_option("--out", o.out, "the package's folder, new")->required();
+        package.add_option("--session", o.session, "seal the capture session, too");
+        package.add_option("--reconstruction", o.reconstruction, "seal the reconstruction, too");
+        package.add_option("--case", o.case_number,
+                           "case number (default: the session's, else the folder's name)");
+        package.add_option("--config", o.config, "station.toml: its keys and its audit log");
+        package.add_option("--keys", o.keys, "folder of keys (default: the configuration's)");
+        package.add_option("--audit-log", o.audit_log, "file (default: the configuration's)");
+        package.add_option("--by", o.by, "who seals it (default: this user)");
+      });
+  add<VerifyCommand>(app, "verify", "is a package as it was sealed? Needs nothing but the package",
+                     chosen, [](CLI::App& verify, VerifyCommand& o) {
+                       verify.add_option("PACKAGE", o.package, "the package's folder")->required();
+                       verify.add_option("--trust", o.trust, trust_help);
+                     });
+
+  CLI::App* keys = app.add_subcommand("keys", "what this station signs with");
+  keys->require_subcommand(1);
+  add<KeysCreateCommand>(
+      *keys, "create", "make a station's keys, once", chosen,
+      [](CLI::App& create, KeysCreateCommand& o) {
+        create.add_option("FOLDER", o.folder, "new")->required();
+        create.add_option("--station", o.station, "name on the certificate")->required();
+        create.add_option("--valid-days", o.valid_days, "of the certificate")
+            ->capture_default_str()
+            ->check(CLI::Range(1, 36500));
+      });
+  add<KeysShowCommand>(*keys, "show", "fingerprints, to be given to those who will verify", chosen,
+                       [](CLI::App& show, KeysShowCommand& o) {
+                         show.add_option("FOLDER", o.folder, "of keys")->required();
+                       });
+
+  CLI::App* audit = app.add_subcommand("audit", "what this station has done");
+  audit->require_subcommand(1);
+  add<AuditVerifyCommand>(
+      *audit, "verify", "was anything in the log changed, removed or reordered?", chosen,
+      [](CLI::App& verify, AuditVerifyCommand& o) {
+        verify.add_option("LOG", o.log, "the audit log")->required();
+        verify.add_option("--head", o.heads,
+                          "a package (or an entry's file) that must have its place in the log; "
+                          "may be given several times: only this shows a removed end");
+        verify.add_option("--trust", o.trust, trust_help);
+      });
+  add<AuditShowCommand>(
+      *audit, "show", "its entries in words", chosen, [](CLI::App& show, AuditShowCommand& o) {
+        show.add_option("LOG", o.log, "the audit log")->required();
+        show.add_option("--case", o.case_number, "of one case only");
+        show.add_option("--last", o.last, "so many from the end")->check(CLI::PositiveNumber);
+      });
+}
+
 void add_commands(CLI::App& app, Command& chosen) {
   add<DemoCommand>(app, "demo", "the whole main job on a simulated station", chosen,
                    [](CLI::App& demo, DemoCommand& o) {
@@ -325,6 +384,8 @@ void add_commands(CLI::App& app, Command& chosen) {
             ->excludes(tissue);
         approximate.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
       });
+
+  add_evidence_commands(app, chosen);
 
   add<DoctorCommand>(app, "doctor", "check devices, space and calibration; say what to mend",
                      chosen, [](CLI::App& doctor, DoctorCommand& o) {

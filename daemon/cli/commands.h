@@ -191,6 +191,57 @@ struct ApproximateCommand {
 };
 Result<CommandReport> run(const ApproximateCommand&, const CommonOptions&, const Progress&);
 
+/// Seals a case as a BagIt bag with signatures (docs/evidence.md).
+struct PackageCommand {
+  std::filesystem::path case_folder;
+  std::filesystem::path out;
+  std::optional<std::filesystem::path> session;
+  std::optional<std::filesystem::path> reconstruction;
+  std::string case_number;          ///< empty: the session's, else the case folder's name
+  std::filesystem::path config;     ///< empty: no audit log, keys from `keys`
+  std::filesystem::path keys;       ///< folder; empty: as the configuration says
+  std::filesystem::path audit_log;  ///< file; empty: as the configuration says
+  std::string by;                   ///< who seals it; empty: this program's user
+};
+Result<CommandReport> run(const PackageCommand&, const CommonOptions&, const Progress&);
+
+/// Is a package as it was sealed?
+struct VerifyCommand {
+  std::filesystem::path package;
+  std::filesystem::path trust;  ///< PEM file of certificates and public keys; empty: none
+};
+Result<CommandReport> run(const VerifyCommand&, const CommonOptions&, const Progress&);
+
+/// Makes the keys that a station signs with.
+struct KeysCreateCommand {
+  std::filesystem::path folder;
+  std::string station;
+  int valid_days = 3650;
+};
+Result<CommandReport> run(const KeysCreateCommand&, const CommonOptions&, const Progress&);
+
+/// Fingerprints of a station's keys, to be compared by other ways than the package's.
+struct KeysShowCommand {
+  std::filesystem::path folder;
+};
+Result<CommandReport> run(const KeysShowCommand&, const CommonOptions&, const Progress&);
+
+/// Was anything in an audit log changed, removed or reordered?
+struct AuditVerifyCommand {
+  std::filesystem::path log;
+  std::vector<std::filesystem::path> heads;  ///< packages, or files with an entry of the log
+  std::filesystem::path trust;               ///< PEM file; empty: none
+};
+Result<CommandReport> run(const AuditVerifyCommand&, const CommonOptions&, const Progress&);
+
+/// The entries of an audit log in words.
+struct AuditShowCommand {
+  std::filesystem::path log;
+  std::string case_number;  ///< empty: of all cases
+  int last = 0;             ///< so many from the end; 0: all
+};
+Result<CommandReport> run(const AuditShowCommand&, const CommonOptions&, const Progress&);
+
 /// Checks devices, space and calibration, and says what to mend.
 struct DoctorCommand {
   std::filesystem::path config;

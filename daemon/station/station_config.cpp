@@ -240,6 +240,12 @@ void visit_config(StationConfig& config, ConfigFields& fields) {
   fields.table("scan", [&] { visit_scan(config.scan, fields); });
   fields.table("gates", [&] { visit_gates(config.gates, fields); });
   fields.table("simulation", [&] { visit_simulation(config.simulation, fields); });
+  fields.table("evidence", [&] {
+    fields.field("keys_folder", config.evidence.keys_folder,
+                 "what packages and the audit log are signed with (skullstation keys create)");
+    fields.field("audit_log", config.evidence.audit_log,
+                 "file of the station's audit log; empty: none is kept");
+  });
 }
 
 LoadedConfig load_config(const std::filesystem::path& file) {

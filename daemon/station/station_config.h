@@ -66,6 +66,11 @@ struct SimulationConfig {
   SimulatedFaults faults;
 };
 
+struct EvidenceConfig {
+  std::string keys_folder = "keys";
+  std::string audit_log;  ///< file; empty: none is kept
+};
+
 /// The content of station.toml. What a file does not say keeps these defaults, which make a
 /// simulated station with two cameras.
 struct StationConfig {
@@ -82,6 +87,7 @@ struct StationConfig {
   ScanConfig scan;
   QualityGates gates;
   SimulationConfig simulation;
+  EvidenceConfig evidence;
 
   static std::vector<CameraConfig> simulated_pair();
 };

@@ -64,6 +64,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
      {"core", "core/session", "reconstruction/io", "reconstruction/rendering",
       "reconstruction/registration", "reconstruction/statistics", "reconstruction/approximation",
       "daemon/report"}},
+    {"daemon/evidence", {"core", "core/session"}},
     {"daemon/cli",
      {"core",
       "core/session",
@@ -86,6 +87,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
       "daemon/subject",
       "daemon/model",
       "daemon/case",
+      "daemon/evidence",
       "daemon/report"}},
 };
 
