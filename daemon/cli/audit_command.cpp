@@ -50,6 +50,11 @@ Result<CommandReport> run(const AuditVerifyCommand& command, const CommonOptions
   if (!command.trust.empty()) {
     auto read = read_trust(command.trust);
     if (!read) return forward(read);
+    if (read->public_keys_pem.empty()) {
+      return fail(ErrorKind::bad_input, command.trust.string(),
+                  "holds no public key, and audit logs are signed with the Ed25519 key alone",
+                  "give the station's ed25519.pub.pem");
+    }
     trust = *std::move(read);
   }
   std::vector<AuditHead> heads;

@@ -162,7 +162,8 @@ Result<CommandReport> run(const VerifyCommand& command, const CommonOptions&,
   report.text += signatures_in_words(*check);
   Json json = {{"package", command.package.string()}};
   json.update(json_of(*check));
-  report.json = json.dump(2);
+  // File names may be any bytes.
+  report.json = json.dump(2, ' ', false, Json::error_handler_t::replace);
   report.exit_code = intact ? 0 : exit_code(ErrorKind::bad_input);
   return report;
 }

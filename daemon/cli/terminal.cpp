@@ -78,14 +78,20 @@ StopOnSignal::StopOnSignal() {
   });
 }
 
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return (c >= 0 && c < 32 && c != '\n' && c != '\t') || c == 127; }, '?');
+  return text;
+}
+
 int finish(const Result<CommandReport>& result, bool json) {
   if (result) {
-    const std::string& text = json ? result->json : result->text;
+    const std::string text = json ? result->json : printable(result->text);
     fmt::print("{}{}", text, text.empty() || text.back() == '\n' ? "" : "\n");
     return result->exit_code;
   }
   const Error& error = result.error();
-  fmt::print(stderr, "skullstation: {}\n", error.message());
+  fmt::print(stderr, "skullstation: {}\n", printable(error.message()));
   if (json) {
     const nlohmann::ordered_json object = {{"error",
                                             {{"kind", to_string(error.kind)},

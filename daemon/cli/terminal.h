@@ -59,6 +59,10 @@ class StopOnSignal {
 /// "1 min 20 s"
 std::string to_words(std::chrono::seconds duration);
 
+/// Control characters but for line feed and tab as '?': words and names that come out of files must
+/// not steer the terminal.
+std::string printable(std::string text);
+
 /// Prints the report (stdout) or the error (stderr; with `json` an object on stdout too) and
 /// returns the process's exit code.
 int finish(const Result<CommandReport>& result, bool json);

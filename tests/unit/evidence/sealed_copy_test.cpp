@@ -16,8 +16,9 @@ using ::testing::HasSubstr;
 TEST(SealedCopy, IsTheFileWithItsSumsForAnySizeAndNumberOfThreads) {
   const testing::TemporaryFolder folder;
   int copies = 0;
-  for (const std::size_t bytes : {std::size_t{0}, std::size_t{1}, std::size_t{block_bytes},
-                                  std::size_t{16 * block_bytes}, std::size_t{33 * block_bytes + 5}}) {
+  for (const std::size_t bytes :
+       {std::size_t{0}, std::size_t{1}, std::size_t{block_bytes}, std::size_t{16 * block_bytes},
+        std::size_t{33 * block_bytes + 5}}) {
     const std::string text = testing::noise(bytes, bytes);
     ASSERT_TRUE(write_file_durably(folder / "from", text));
     for (const int threads : {1, 2, 3}) {

@@ -133,10 +133,11 @@ TEST_F(SpoiledKeys, AnAuthoritysCertificateMakesAStationsTrusted) {
   const UtcTime now = SystemClock().utc_now();
   const auto by_authority = read_trust(folder_ / "ca.pem");
   EXPECT_TRUE(trusts_certificate(*by_authority, keys->certificate_pem, now));
-  EXPECT_THAT(trusts_certificate(*by_authority, keys->certificate_pem, now + std::chrono::hours(600))
-                  .error()
-                  .message(),
-              HasSubstr("expired"));
+  EXPECT_THAT(
+      trusts_certificate(*by_authority, keys->certificate_pem, now + std::chrono::hours(600))
+          .error()
+          .message(),
+      HasSubstr("expired"));
   EXPECT_TRUE(
       trusts_certificate(*read_trust(keys_ / "certificate.pem"), keys->certificate_pem, now));
   const auto by_other = read_trust(testing::test_keys_folder() / "certificate.pem");
