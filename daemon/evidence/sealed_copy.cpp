@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <memory>
+#include <string_view>
 
 #include "core/file.h"
 #include "core/file_descriptor.h"
@@ -24,18 +26,27 @@ constexpr std::size_t chunk_bytes = 16 * block_bytes;
 /// Below it, threads cost more than they save.
 constexpr std::uint64_t parallel_from_bytes = 1024 * 1024;
 
-/// Fills the buffer as far as the file goes; 0 or an errno.
-int read_chunk(const FileDescriptor& file, std::string& chunk) {
-  chunk.resize(chunk_bytes);
+/// A piece of a file. Its buffer is not cleared first: a small file would pay for a large one's.
+struct Chunk {
+  std::unique_ptr<char[]> buffer;
+  std::size_t capacity = 0;
   std::size_t filled = 0;
-  while (filled < chunk.size()) {
-    const ssize_t got = ::read(file.get(), chunk.data() + filled, chunk.size() - filled);
+
+  explicit Chunk(std::size_t size) : buffer(new char[size]), capacity(size) {}
+  std::string_view bytes() const { return {buffer.get(), filled}; }
+};
+
+/// Fills the buffer as far as the file goes; 0 or an errno.
+int read_chunk(const FileDescriptor& file, Chunk& chunk) {
+  chunk.filled = 0;
+  while (chunk.filled < chunk.capacity) {
+    const ssize_t got =
+        ::read(file.get(), chunk.buffer.get() + chunk.filled, chunk.capacity - chunk.filled);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return errno;
     if (got == 0) break;
-    filled += static_cast<std::size_t>(got);
+    chunk.filled += static_cast<std::size_t>(got);
   }
-  chunk.resize(filled);
   return 0;
 }
 
@@ -70,10 +81,12 @@ Result<FileDigest> digest(const fs::path& from, const fs::path& to, int threads,
   if (expected < parallel_from_bytes) threads = 1;
   FileDigest found;
   Sha256 whole;
-  std::array<std::string, 2> chunks;
+  const auto capacity = static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(expected, block_bytes, chunk_bytes) / block_bytes * block_bytes);
+  std::array<Chunk, 2> chunks = {Chunk(capacity), Chunk(capacity)};
   int read_failure = read_chunk(in, chunks[0]);
   for (int current = 0; read_failure == 0; current = 1 - current) {
-    const std::string& chunk = chunks[static_cast<std::size_t>(current)];
+    const std::string_view chunk = chunks[static_cast<std::size_t>(current)].bytes();
     if (chunk.empty()) break;
     if (stop.stop_requested()) return cancelled(from);
     int write_failure = 0;
