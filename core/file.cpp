@@ -8,14 +8,24 @@
 #include <array>
 #include <cerrno>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <system_error>
+#include <vector>
 
 namespace skullstation {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+using Digest = std::array<unsigned char, EVP_MAX_MD_SIZE>;
+
+std::string hex_of(const Digest& digest, unsigned int size) {
+  std::string hex;
+  for (unsigned int i = 0; i < size; ++i) hex += fmt::format("{:02x}", digest[i]);
+  return hex;
+}
 
 std::string reason(int error_number) { return std::system_category().message(error_number); }
 
@@ -55,7 +65,7 @@ int write_and_sync(const fs::path& path, std::string_view bytes) {
   return ::fsync(file.get()) == 0 ? 0 : errno;
 }
 
-int sync_folder(const fs::path& folder) {
+int folder_sync_failure(const fs::path& folder) {
   const FileDescriptor handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (handle.get() < 0) return errno;
   return ::fsync(handle.get()) == 0 ? 0 : errno;
@@ -85,7 +95,7 @@ Result<void> write_file_durably(const fs::path& path, std::string_view bytes) {
   const fs::path temporary = path.string() + ".part";
   int failure = write_and_sync(temporary, bytes);
   if (failure == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) failure = errno;
-  if (failure == 0) failure = sync_folder(folder);
+  if (failure == 0) failure = folder_sync_failure(folder);
   if (failure != 0) {
     ::unlink(temporary.c_str());
     return write_error(path, failure);
@@ -114,13 +124,42 @@ Result<std::uint64_t> free_space_bytes(const fs::path& folder) {
   return space.available;
 }
 
+Result<void> sync_folder(const fs::path& folder) {
+  if (const int failure = folder_sync_failure(folder); failure != 0) {
+    return write_error(folder, failure);
+  }
+  return {};
+}
+
 std::string sha256_hex(std::string_view bytes) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  Digest digest{};
   unsigned int size = 0;
   EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr);
-  std::string hex;
-  for (unsigned int i = 0; i < size; ++i) hex += fmt::format("{:02x}", digest[i]);
-  return hex;
+  return hex_of(digest, size);
+}
+
+Result<std::string> sha256_of_file(const fs::path& path) {
+  const auto unreadable = [&] {
+    return fail(ErrorKind::bad_input, path.string(),
+                fmt::format("can't be read ({})", reason(errno)));
+  };
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0) return unreadable();
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
+                                                                        &EVP_MD_CTX_free);
+  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
+  std::vector<char> buffer(std::size_t{1} << 18);
+  for (;;) {
+    const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return unreadable();
+    if (count == 0) break;
+    EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(count));
+  }
+  Digest digest{};
+  unsigned int size = 0;
+  EVP_DigestFinal_ex(context.get(), digest.data(), &size);
+  return hex_of(digest, size);
 }
 
 }  // namespace skullstation
