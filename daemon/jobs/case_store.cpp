@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <thread>
 #include <utility>
 
 #include "core/file.h"
@@ -91,10 +92,14 @@ Result<int> lock_folder(const fs::path& folder) {
     return fail(ErrorKind::bad_input, file.string(),
                 fmt::format("can't be written ({})", std::system_category().message(errno)));
   }
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
-    ::close(descriptor);
-    return fail(ErrorKind::bad_input, folder.string(), "is used by another skullstationd",
-                "end that one, or choose another folder");
+  // A daemon that was just killed may have left a child that is still on its way out.
+  for (int attempt = 0; ::flock(descriptor, LOCK_EX | LOCK_NB) != 0; ++attempt) {
+    if (attempt == 100) {
+      ::close(descriptor);
+      return fail(ErrorKind::bad_input, folder.string(), "is used by another skullstationd",
+                  "end that one, or choose another folder");
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   return descriptor;
 }

@@ -15,7 +15,7 @@ using enum StationAction;
 constexpr auto transitions = std::to_array<Transition>({
     // from      event             to         lamp and buzzer    action
     {starting,  opened,           ready,     Signal::ready,     look_for_jobs},
-    {starting,  unfinished_scan,  turn_over, Signal::attention, resume_scan},
+    {starting,  unfinished_scan,  scanning,  Signal::working,   resume_scan},
     {starting,  not_opened,       fault,     Signal::fault,     none},
     {starting,  stop_pressed,     fault,     Signal::fault,     none},
 
@@ -32,14 +32,13 @@ constexpr auto transitions = std::to_array<Transition>({
     {scanning,  scan_cancelled,   ready,     Signal::ready,     look_for_jobs},
     {scanning,  scan_refused,     ready,     Signal::attention, none},
     {scanning,  scan_failed,      fault,     Signal::fault,     none},
-    {scanning,  stop_pressed,     fault,     Signal::fault,     none},
-    {scanning,  door_opened,      fault,     Signal::fault,     none},
+    {scanning,  stop_pressed,     fault,     Signal::fault,     halt_scan},
+    {scanning,  door_opened,      fault,     Signal::fault,     halt_scan},
 
     {turn_over, go,               scanning,  Signal::working,   confirm_placement},
     {turn_over, cancel,           scanning,  Signal::working,   cancel_scan},
-    {turn_over, placement_wanted, turn_over, Signal::attention, none},
     {turn_over, scan_failed,      fault,     Signal::fault,     none},
-    {turn_over, stop_pressed,     fault,     Signal::fault,     none},
+    {turn_over, stop_pressed,     fault,     Signal::fault,     halt_scan},
 
     {building,  go,               scanning,  Signal::working,   begin_scan},
     {building,  case_done,        result,    Signal::done,      none},
@@ -82,6 +81,7 @@ constexpr std::array action_names{"",
                                   "resume scan",
                                   "confirm placement",
                                   "cancel scan",
+                                  "halt scan",
                                   "look for jobs",
                                   "stop"};
 constexpr std::array signal_names{"off",      "ready", "working", "attention",

@@ -56,7 +56,8 @@ enum class StationAction {
   begin_scan,
   resume_scan,
   confirm_placement,
-  cancel_scan,
+  cancel_scan,    ///< for good
+  halt_scan,      ///< it can go on later
   look_for_jobs,  ///< tells jobs_waiting if there are any
   stop,           ///< scan and steps end where they can be resumed
 };

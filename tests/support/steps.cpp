@@ -53,8 +53,8 @@ Result<Case> scan_fake_case(CaseStore& store, const std::string& number, const S
   return store.case_of(begun->id);
 }
 
-bool comes_true(const std::function<bool()>& condition) {
-  const auto deadline = std::chrono::steady_clock::now() + 20s;
+bool comes_true(const std::function<bool()>& condition, std::chrono::seconds time) {
+  const auto deadline = std::chrono::steady_clock::now() + time;
   while (std::chrono::steady_clock::now() < deadline) {
     if (condition()) return true;
     std::this_thread::sleep_for(5ms);

@@ -24,7 +24,8 @@ EngineOptions fake_engine_options(StepChain chain);
 Result<Case> scan_fake_case(CaseStore& store, const std::string& number, const StepChain& chain,
                             int pictures = 3);
 
-/// Polls until it holds; false after 20 s.
-bool comes_true(const std::function<bool()>& condition);
+/// Polls until it holds; false after the time.
+bool comes_true(const std::function<bool()>& condition,
+                std::chrono::seconds time = std::chrono::seconds(60));
 
 }  // namespace skullstation::testing
