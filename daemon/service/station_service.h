@@ -70,7 +70,6 @@ class StationService {
   void walk(StationEvent event);
   void act(StationAction action);
   void open_parts(bool reset);
-  Result<StationEvent> opened_with();
   Result<bool> scan_to_resume();
   void scan(bool resume);
   Result<std::optional<Case>> begin_case();

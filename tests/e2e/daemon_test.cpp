@@ -103,7 +103,8 @@ class Daemon : public ::testing::Test {
   }
   json cases() const { return ask("cases")["cases"]; }
   json job(int case_id, const std::string& step) const {
-    for (const json& row : ask(fmt::format("jobs {}", case_id))["jobs"]) {
+    const json answer = ask(fmt::format("jobs {}", case_id));
+    for (const json& row : answer["jobs"]) {
       if (row["step"] == step) return row;
     }
     return {};
@@ -113,7 +114,8 @@ class Daemon : public ::testing::Test {
     const int scan = job(case_id, "scan")["id"];
     std::size_t images = 0;
     std::size_t views = 0;
-    for (const json& file : ask(fmt::format("files {}", scan))["files"]) {
+    const json answer = ask(fmt::format("files {}", scan));
+    for (const json& file : answer["files"]) {
       const auto bytes = read_file(file["blob"].get<std::string>());
       EXPECT_TRUE(bytes);
       EXPECT_EQ(sha256_hex(*bytes), file["sha256"]);
@@ -328,52 +330,6 @@ TEST_F(Daemon, WhatIsWrongWithItsCallIsSaid) {
   EXPECT_THAT(ask("dance").value("error", ""), HasSubstr("unknown word \"dance\""));
   EXPECT_THAT(ask("retry 7").value("error", ""), HasSubstr("there is no such job"));
   end();
-}
-
-class Step : public ::testing::Test {
- protected:
-  /// What `skullstation step NAME` says to this request.
-  skullstation::testing::ProcessResult step(const std::string& name, json request) {
-    if (!request.is_null()) {
-      EXPECT_TRUE(write_file_durably(folder_ / "request.json", request.dump()));
-    }
-    return skullstation::testing::skullstation_cli({"step", name, folder_.path().string()});
-  }
-  json request(const std::string& name, json inputs, json options) {
-    return {{"format", "skullstation-step/1"},
-            {"step", name},
-            {"inputs", std::move(inputs)},
-            {"options", std::move(options)},
-            {"out", (folder_ / "out").string()},
-            {"threads", 1},
-            {"seed", 1}};
-  }
-
-  TemporaryFolder folder_;
-};
-
-TEST_F(Step, ARequestThatMakesNoSenseIsNamed) {
-  const json scan = {{"scan", (folder_ / "session").string()}};
-  const auto missing = step("reconstruct", nullptr);
-  EXPECT_EQ(missing.exit_code, 3);
-  EXPECT_THAT(missing.err, HasSubstr("request.json: can't be read"));
-  const auto unknown = step("dance", request("dance", scan, json::object()));
-  EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(unknown.err, HasSubstr("step \"dance\": is not known; use one of: reconstruct"));
-  EXPECT_THAT(step("reconstruct", request("approximate", scan, json::object())).err,
-              HasSubstr("step is not \"reconstruct\""));
-  EXPECT_THAT(step("reconstruct", request("reconstruct", scan, {{"qualty", "fine"}})).err,
-              HasSubstr("qualty"));
-  EXPECT_THAT(step("reconstruct", request("reconstruct", scan, {{"quality", "superb"}})).err,
-              HasSubstr("must be draft, standard or fine"));
-  EXPECT_THAT(step("approximate", request("approximate", {{"reconstruct", folder_.path().string()}},
-                                          {{"sex", "yes"}}))
-                  .err,
-              HasSubstr("must be male or female"));
-  const auto no_session = step("reconstruct", request("reconstruct", scan, json::object()));
-  EXPECT_EQ(no_session.exit_code, 3);
-  EXPECT_THAT(no_session.err, HasSubstr("session"));
-  EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
 }  // namespace
