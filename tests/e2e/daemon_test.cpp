@@ -52,6 +52,7 @@ class Daemon : public ::testing::Test {
   /// Writes the configuration: a turntable that is quick in real time.
   void configure(const std::string& camera = "", const std::string& station = "") {
     skullstation::testing::SmallStation small;
+    small.views_per_ring = 2;
     small.camera = camera;
     small.extra =
         "[turntable]\nsteps_per_turn = 200\nmax_speed_deg_s = 1000\n"
@@ -97,7 +98,7 @@ class Daemon : public ::testing::Test {
   std::string message() const { return ask("status").value("message", ""); }
   std::string signal() const { return ask("status").value("signal", ""); }
   bool becomes(const std::string& wanted) const {
-    const bool became = skullstation::testing::comes_true([&] { return state() == wanted; }, 120s);
+    const bool became = skullstation::testing::comes_true([&] { return state() == wanted; }, 300s);
     if (!became) ADD_FAILURE() << "still " << ask("status").dump() << ", not " << wanted;
     return became;
   }
@@ -158,7 +159,7 @@ TEST_F(Daemon, FromButtonToResultAndTheNextSpecimenMeanwhile) {
   ASSERT_TRUE(becomes("building"));
   EXPECT_EQ(signal(), "building");
   EXPECT_THAT(message(), HasSubstr("Case 2026-0042 is saved"));
-  EXPECT_EQ(views_of(1), 16U);
+  EXPECT_EQ(views_of(1), 8U);
 
   ask("press");  // the next specimen, while the first case waits for its step
   ASSERT_TRUE(becomes("turn-over"));
@@ -175,7 +176,7 @@ TEST_F(Daemon, FromButtonToResultAndTheNextSpecimenMeanwhile) {
   EXPECT_EQ(cases()[0]["number"], "2026-0042");
   EXPECT_EQ(cases()[0]["state"], "done");
   EXPECT_EQ(job(1, "approximate")["state"], "done");
-  EXPECT_EQ(views_of(2), 16U);
+  EXPECT_EQ(views_of(2), 8U);
   ask("hold");  // seen
   ASSERT_TRUE(becomes("ready"));
   end();
@@ -197,7 +198,7 @@ TEST_F(Daemon, AHeldPressGivesTheScanUp) {
   ASSERT_TRUE(becomes("turn-over"));
   ask("press");
   ASSERT_TRUE(becomes("result"));
-  EXPECT_EQ(views_of(2), 16U);
+  EXPECT_EQ(views_of(2), 8U);
   end();
 }
 
@@ -221,7 +222,7 @@ TEST_F(Daemon, AnEmergencyStopIsLatchedAndTheScanGoesOnAfterwards) {
   ASSERT_TRUE(becomes("turn-over"));
   ask("press");
   ASSERT_TRUE(becomes("result"));
-  EXPECT_EQ(views_of(1), 16U);
+  EXPECT_EQ(views_of(1), 8U);
   EXPECT_EQ(cases().size(), 1U);
   end();
 }
@@ -266,7 +267,7 @@ TEST_F(Daemon, SurvivesKillsDuringAScan) {
           const std::string now = state();
           return now == "ready" || now == "turn-over" || now == "building" || now == "result";
         },
-        120s));
+        300s));
     ask("press");
     std::this_thread::sleep_for(std::chrono::milliseconds(random.below(400)));
     daemon_->send(SIGKILL);
@@ -284,10 +285,10 @@ TEST_F(Daemon, SurvivesKillsDuringAScan) {
         }
         return true;
       },
-      120s));
+      300s));
   for (const json& row : cases()) {
     EXPECT_TRUE(row["state"] == "done" || row["state"] == "cancelled") << row.dump();
-    if (row["state"] == "done") EXPECT_EQ(views_of(row["id"]), 16U);
+    if (row["state"] == "done") EXPECT_EQ(views_of(row["id"]), 8U);
   }
   end();
   const SystemClock clock;
