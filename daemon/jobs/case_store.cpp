@@ -6,7 +6,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
+#include <ctime>
 #include <fstream>
+#include <system_error>
 #include <thread>
 #include <utility>
 

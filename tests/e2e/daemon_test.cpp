@@ -288,7 +288,9 @@ TEST_F(Daemon, SurvivesKillsDuringAScan) {
       300s));
   for (const json& row : cases()) {
     EXPECT_TRUE(row["state"] == "done" || row["state"] == "cancelled") << row.dump();
-    if (row["state"] == "done") EXPECT_EQ(views_of(row["id"]), 8U);
+    if (row["state"] == "done") {
+      EXPECT_EQ(views_of(row["id"]), 8U);
+    }
   }
   end();
   const SystemClock clock;

@@ -78,7 +78,9 @@ void expect_intact(CaseStore& store, const Acknowledged& told) {
     const std::string first = fmt::format("first(<{0}-0><{0}-1><{0}-2>)", number);
     for (const Job& job : jobs) {
       if (job.state != JobState::done) continue;
-      if (job.step == "first") EXPECT_EQ(content(store, job, 0), first);
+      if (job.step == "first") {
+        EXPECT_EQ(content(store, job, 0), first);
+      }
       if (job.step == "second") {
         EXPECT_EQ(content(store, job, 0),
                   "second(" + first + ")" + (job.options == R"({"mark": "?"})" ? "?" : "!"));
@@ -230,7 +232,9 @@ Reached live_on(const fs::path& disk, std::uint64_t free) {
   }
   const auto jobs = *(*store)->jobs(saved->id);
   for (const Job& job : jobs) {
-    if (job.state == JobState::failed) EXPECT_TRUE((*store)->retry(job.id)) << job.error;
+    if (job.state == JobState::failed) {
+      EXPECT_TRUE((*store)->retry(job.id)) << job.error;
+    }
   }
   JobEngine engine(**store, fake_engine_options(chain), [](JobNews, std::int64_t) {});
   EXPECT_TRUE(skullstation::testing::comes_true([&] {

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -87,7 +88,8 @@ int main(int count, char** words) {
     for (;;) std::this_thread::sleep_for(std::chrono::seconds(1));
   }
   if (what == "spin") {
-    for (volatile unsigned i = 0;; i = i + 1) {
+    const auto for_ever = std::chrono::steady_clock::time_point::max();
+    while (std::chrono::steady_clock::now() < for_ever) {
     }
   }
   if (what == "leave a child") {

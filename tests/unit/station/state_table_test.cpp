@@ -68,7 +68,9 @@ TEST(StateTable, EveryPairKeepsTheStationsPromises) {
     } else {
       EXPECT_NE(next, stopped) << words(pair);
     }
-    if (pair.event == stop_pressed) EXPECT_EQ(next, fault) << words(pair);
+    if (pair.event == stop_pressed) {
+      EXPECT_EQ(next, fault) << words(pair);
+    }
     if (pair.state == fault && pair.event != shut_down) {
       EXPECT_EQ(next, pair.event == go || pair.event == camera_back ? starting : fault)
           << words(pair) << ": a fault is latched";
@@ -93,9 +95,15 @@ TEST(StateTable, EveryPairKeepsTheStationsPromises) {
     if (t == nullptr) continue;
     EXPECT_EQ(t->signal == Signal::fault, next == fault) << words(pair);
     EXPECT_EQ(t->signal == Signal::off, next == stopped) << words(pair);
-    if (next == scanning) EXPECT_EQ(t->signal, Signal::working) << words(pair);
-    if (next == turn_over) EXPECT_EQ(t->signal, Signal::attention) << words(pair);
-    if (next == building) EXPECT_EQ(t->signal, Signal::building) << words(pair);
+    if (next == scanning) {
+      EXPECT_EQ(t->signal, Signal::working) << words(pair);
+    }
+    if (next == turn_over) {
+      EXPECT_EQ(t->signal, Signal::attention) << words(pair);
+    }
+    if (next == building) {
+      EXPECT_EQ(t->signal, Signal::building) << words(pair);
+    }
     const bool begins = t->action == StationAction::begin_scan;
     EXPECT_EQ(begins, can_scan(pair.state) && pair.event == go) << words(pair);
   }
@@ -114,7 +122,9 @@ TEST(StateTable, EveryStateIsReachedAndReadyIsReachedFromAllButTheEnd) {
   };
   EXPECT_EQ(reached_from(starting).size(), station_states().size());
   for (const StationState state : station_states()) {
-    if (state != stopped) EXPECT_TRUE(reached_from(state).contains(ready)) << to_string(state);
+    if (state != stopped) {
+      EXPECT_TRUE(reached_from(state).contains(ready)) << to_string(state);
+    }
   }
 }
 
