@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 #include <system_error>
+#include <vector>
 
 #include "core/file_descriptor.h"
 #include "core/sha256.h"
@@ -24,6 +25,12 @@ int write_and_sync(const fs::path& path, std::string_view bytes) {
   if (file.get() < 0) return errno;
   if (const int failure = write_all(file, bytes); failure != 0) return failure;
   return ::fsync(file.get()) == 0 ? 0 : errno;
+}
+
+int folder_sync_failure(const fs::path& folder) {
+  const FileDescriptor handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (handle.get() < 0) return errno;
+  return ::fsync(handle.get()) == 0 ? 0 : errno;
 }
 
 }  // namespace
@@ -47,7 +54,7 @@ Result<void> write_file_durably(const fs::path& path, std::string_view bytes) {
   const fs::path temporary = path.string() + ".part";
   int failure = write_and_sync(temporary, bytes);
   if (failure == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) failure = errno;
-  if (failure == 0) failure = sync_folder(folder);
+  if (failure == 0) failure = folder_sync_failure(folder);
   if (failure != 0) {
     ::unlink(temporary.c_str());
     return write_error(path, failure);
@@ -76,9 +83,31 @@ Result<std::uint64_t> free_space_bytes(const fs::path& folder) {
   return space.available;
 }
 
+Result<void> sync_folder(const fs::path& folder) {
+  if (const int failure = folder_sync_failure(folder); failure != 0) {
+    return write_error(folder, failure);
+  }
+  return {};
+}
+
 std::string sha256_hex(std::string_view bytes) {
   Sha256 sum;
   sum.update(bytes);
+  return sum.finish();
+}
+
+Result<std::string> sha256_of_file(const fs::path& path) {
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0) return read_error(path, errno);
+  Sha256 sum;
+  std::vector<char> buffer(std::size_t{1} << 18);
+  for (;;) {
+    const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return read_error(path, errno);
+    if (count == 0) break;
+    sum.update({buffer.data(), static_cast<std::size_t>(count)});
+  }
   return sum.finish();
 }
 

@@ -23,7 +23,13 @@ Result<void> make_writable_folder(const std::filesystem::path& folder);
 /// Free space [bytes] for this user on the volume of `folder`.
 Result<std::uint64_t> free_space_bytes(const std::filesystem::path& folder);
 
+/// Makes what was done in the folder (files made, renamed, removed) outlast a power cut.
+Result<void> sync_folder(const std::filesystem::path& folder);
+
 /// Lower-case hexadecimal SHA-256 of the bytes (64 characters).
 std::string sha256_hex(std::string_view bytes);
+
+/// The same of a file's content, however large.
+Result<std::string> sha256_of_file(const std::filesystem::path& path);
 
 }  // namespace skullstation

@@ -31,12 +31,6 @@ int write_all(const FileDescriptor& file, std::string_view bytes) {
   return 0;
 }
 
-int sync_folder(const fs::path& folder) {
-  const FileDescriptor handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (handle.get() < 0) return errno;
-  return ::fsync(handle.get()) == 0 ? 0 : errno;
-}
-
 tl::unexpected<Error> write_error(const fs::path& path, int error_number) {
   const std::string advice = error_number == ENOSPC ? "free some space on this volume"
                              : error_number == EACCES || error_number == EROFS

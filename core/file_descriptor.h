@@ -23,9 +23,6 @@ class FileDescriptor {
 /// Writes all of it, however often the kernel takes only a part. Returns 0 or an errno.
 int write_all(const FileDescriptor& file, std::string_view bytes);
 
-/// Makes names in the folder survive a power cut. Returns 0 or an errno.
-int sync_folder(const std::filesystem::path& folder);
-
 /// What to tell a user when writing `path` failed with `error_number`.
 tl::unexpected<Error> write_error(const std::filesystem::path& path, int error_number);
 

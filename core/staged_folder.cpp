@@ -5,7 +5,6 @@
 #include <system_error>
 
 #include "core/file.h"
-#include "core/file_descriptor.h"
 
 namespace skullstation {
 
@@ -39,10 +38,7 @@ Result<void> StagedFolder::put_in_place() {
   fs::rename(staged_, place_, error);
   if (error) return fail(ErrorKind::bad_input, place_.string(), error.message());
   done_ = true;
-  if (const int failure = sync_folder(place_.parent_path()); failure != 0) {
-    return write_error(place_, failure);
-  }
-  return {};
+  return sync_folder(place_.parent_path());
 }
 
 Result<void> check_new_folder(const fs::path& folder) {

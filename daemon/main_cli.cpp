@@ -8,6 +8,7 @@
 #include <string>
 
 #include "daemon/cli/commands.h"
+#include "daemon/cli/step_command.h"
 #include "daemon/cli/terminal.h"
 #include "reconstruction/rendering/picture_sheet.h"
 
@@ -386,6 +387,13 @@ void add_commands(CLI::App& app, Command& chosen) {
       });
 
   add_evidence_commands(app, chosen);
+
+  add<StepCommand>(
+      app, "step", "one step of a case; called by skullstationd", chosen,
+      [](CLI::App& step, StepCommand& o) {
+        step.add_option("NAME", o.name, "reconstruct or approximate")->required();
+        step.add_option("FOLDER", o.folder, "working folder with request.json")->required();
+      });
 
   add<DoctorCommand>(app, "doctor", "check devices, space and calibration; say what to mend",
                      chosen, [](CLI::App& doctor, DoctorCommand& o) {

@@ -27,8 +27,9 @@ class Button {
 enum class Signal {
   off,
   ready,      ///< green steady
-  working,    ///< yellow steady: scanning or building
+  working,    ///< yellow steady: scanning
   attention,  ///< yellow blinking, two short beeps: "turn it over"
+  building,   ///< green and yellow steady, one short beep: saved, the next specimen may come
   done,       ///< green blinking, one long beep
   fault,      ///< red steady, three beeps
 };

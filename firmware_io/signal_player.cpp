@@ -12,7 +12,7 @@ using std::chrono::steady_clock;
 
 namespace {
 
-enum class Lamp { none, green, yellow, red };
+enum class Lamp { none, green, yellow, green_and_yellow, red };
 
 struct Pattern {
   Signal signal;
@@ -22,11 +22,12 @@ struct Pattern {
   milliseconds beep;  // the length of each
 };
 
-constexpr std::array<Pattern, 6> patterns{{
+constexpr std::array<Pattern, 7> patterns{{
     {Signal::off, Lamp::none, false, 0, 0ms},
     {Signal::ready, Lamp::green, false, 0, 0ms},
     {Signal::working, Lamp::yellow, false, 0, 0ms},
     {Signal::attention, Lamp::yellow, true, 2, 200ms},
+    {Signal::building, Lamp::green_and_yellow, false, 1, 200ms},
     {Signal::done, Lamp::green, true, 1, 1000ms},
     {Signal::fault, Lamp::red, false, 3, 400ms},
 }};
@@ -56,8 +57,9 @@ PanelState panel_at(Signal signal, milliseconds shown_for) {
   const bool lit = !pattern.blinking || shown_for / blink_half % 2 == 0;
   const bool beeping =
       still_beeping(pattern, shown_for) && shown_for % beep_period(pattern) < pattern.beep;
-  return {.green = lit && pattern.lamp == Lamp::green,
-          .yellow = lit && pattern.lamp == Lamp::yellow,
+  const bool both = pattern.lamp == Lamp::green_and_yellow;
+  return {.green = lit && (both || pattern.lamp == Lamp::green),
+          .yellow = lit && (both || pattern.lamp == Lamp::yellow),
           .red = lit && pattern.lamp == Lamp::red,
           .buzzer = beeping};
 }

@@ -148,8 +148,8 @@ Result<std::string> append_audit_entry(const AuditLogPlace& log, const AuditEven
   }
   if (::fsync(file.get()) != 0) return write_error(log.file, errno);
   const fs::path folder = fs::absolute(log.file).parent_path();
-  if (const int failure = is_new ? sync_folder(folder) : 0; failure != 0) {
-    return write_error(log.file, failure);
+  if (is_new) {
+    if (const auto synced = sync_folder(folder); !synced) return forward(synced);
   }
   return line;
 }

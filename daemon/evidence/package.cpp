@@ -7,7 +7,6 @@
 #include <set>
 
 #include "core/file.h"
-#include "core/file_descriptor.h"
 #include "core/staged_folder.h"
 #include "daemon/evidence/bag_manifest.h"
 #include "daemon/evidence/cms_signature.h"
@@ -81,9 +80,7 @@ Result<SealedFiles> copy_payload(const PackageContent& content, const StagedFold
   }
   for (const fs::path& folder : folders) {
     for (fs::path parent = folder; parent != staged.path(); parent = parent.parent_path()) {
-      if (const int failure = sync_folder(parent); failure != 0) {
-        return write_error(parent, failure);
-      }
+      if (const auto synced = sync_folder(parent); !synced) return forward(synced);
     }
   }
   return sealed;

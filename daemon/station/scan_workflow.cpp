@@ -40,16 +40,6 @@ std::string_view placement_words(int pass) {
   }
 }
 
-std::string request_words(const PlacementRequest& request) {
-  if (request.continued) {
-    return fmt::format(
-        "The scan goes on: the specimen must lie {} exactly as it did. Press the button.",
-        placement_words(request.pass));
-  }
-  return fmt::format("Lay the specimen {} on the board, then press the button.",
-                     placement_words(request.pass));
-}
-
 /// Every picture that reaches the disk gets its truth noted and written before session.json names
 /// the picture, so that an interrupted scan has it too.
 void note_truths(SimulatedRoom& room, const ScanPlan& plan, const std::filesystem::path& session,
@@ -79,24 +69,54 @@ Result<void> wait_for_confirmation(StationHardware& hardware, std::stop_token st
   return fail(ErrorKind::cancelled, "", "cancelled");
 }
 
+std::string placement_prompt(const PlacementRequest& request) {
+  if (request.continued) {
+    return fmt::format(
+        "The scan goes on: the specimen must lie {} exactly as it did. Press the button.",
+        placement_words(request.pass));
+  }
+  return fmt::format("Lay the specimen {} on the board, then press the button.",
+                     placement_words(request.pass));
+}
+
+std::uint64_t scan_space_bytes(const StationConfig& config) {
+  std::uint64_t bytes = 0;
+  for (const CameraConfig& camera : config.cameras) {
+    const auto pixels =
+        static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
+    bytes += static_cast<std::uint64_t>(config.scan.views_per_ring * config.scan.passes) *
+             (3 * pixels + pixels / 10);
+  }
+  return bytes;
+}
+
+Result<ScanReport> photograph_specimen(const StationConfig& config, Station& station,
+                                       const std::string& case_number,
+                                       const std::filesystem::path& session,
+                                       const AskForPlacement& ask, const Progress& progress) {
+  const ScanOptions options = options_of(config, case_number);
+  ScanStation scan{station.hardware, station.scan_cameras(), *station.clock, ask};
+  if (station.room) {
+    note_truths(*station.room, options.plan, session, scan);
+    station.room->place_specimen(0);
+    scan.ask_for_placement = [&](const PlacementRequest& request, std::stop_token stop) {
+      const auto confirmed = ask(request, std::move(stop));
+      if (confirmed) station.room->place_specimen(request.pass);
+      return confirmed;
+    };
+  }
+  return run_scan(options, scan, session, progress);
+}
+
 Result<ScanReport> scan_specimen(const StationConfig& config, Station& station,
                                  const std::string& case_number,
                                  const std::filesystem::path& session,
                                  const OperatorPrompts& prompts, const Progress& progress) {
-  const ScanOptions options = options_of(config, case_number);
   StationHardware& hardware = station.hardware;
-
-  ScanStation scan{hardware, station.scan_cameras(), *station.clock, {}};
-  if (station.room) {
-    note_truths(*station.room, options.plan, session, scan);
-    scan.ask_for_placement = [&](const PlacementRequest& request, std::stop_token) -> Result<void> {
-      station.room->place_specimen(request.pass);
-      return {};
-    };
-  } else {
-    scan.ask_for_placement = [&](const PlacementRequest& request,
-                                 std::stop_token stop) -> Result<void> {
-      prompts.tell(request_words(request));
+  AskForPlacement ask = [](const PlacementRequest&, std::stop_token) -> Result<void> { return {}; };
+  if (!station.room) {
+    ask = [&](const PlacementRequest& request, std::stop_token stop) -> Result<void> {
+      prompts.tell(placement_prompt(request));
       if (auto shown = hardware.lamp->show(Signal::attention); !shown) return shown;
       if (auto confirmed = wait_for_confirmation(hardware, std::move(stop)); !confirmed) {
         return confirmed;
@@ -106,7 +126,7 @@ Result<ScanReport> scan_specimen(const StationConfig& config, Station& station,
   }
 
   if (const auto shown = hardware.lamp->show(Signal::working); !shown) return forward(shown);
-  auto report = run_scan(options, scan, session, progress);
+  auto report = photograph_specimen(config, station, case_number, session, ask, progress);
   const bool stopped_by_hand = !report && report.error().kind == ErrorKind::cancelled;
   const Signal outcome = report ? Signal::done : stopped_by_hand ? Signal::ready : Signal::fault;
   // A lamp that fails now must not hide the scan's own outcome.

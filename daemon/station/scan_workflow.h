@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -26,6 +27,22 @@ Result<ScanReport> scan_specimen(const StationConfig& config, Station& station,
                                  const std::string& case_number,
                                  const std::filesystem::path& session,
                                  const OperatorPrompts& prompts, const Progress& progress);
+
+/// How a scan asks for the specimen to be laid down (ScanStation::ask_for_placement).
+using AskForPlacement = std::function<Result<void>(const PlacementRequest&, std::stop_token)>;
+
+/// The scan alone: lamp, buzzer and prompts are the caller's. In a simulated room the specimen is
+/// laid down, as a person would, when `ask` has returned.
+Result<ScanReport> photograph_specimen(const StationConfig& config, Station& station,
+                                       const std::string& case_number,
+                                       const std::filesystem::path& session,
+                                       const AskForPlacement& ask, const Progress& progress);
+
+/// "Lay the specimen upside down on the board, then press the button."
+std::string placement_prompt(const PlacementRequest& request);
+
+/// What a scan of this configuration may take on the disk at most [bytes].
+std::uint64_t scan_space_bytes(const StationConfig& config);
 
 /// Waits until the operator has confirmed at the button: brief press goes on, held press cancels.
 Result<void> wait_for_confirmation(StationHardware& hardware, std::stop_token stop);

@@ -109,9 +109,9 @@ Result<std::unique_ptr<Camera>> open_camera(const CameraConfig& camera, Simulate
 }
 
 Result<Station> open_station(const StationConfig& config, RoomSetting setting, std::uint64_t seed,
-                             int threads) {
+                             int threads, SimulatedTime time) {
   Station station;
-  if (all_simulated(config)) {
+  if (all_simulated(config) && time == SimulatedTime::virtual_time) {
     station.clock = std::make_unique<SimulatedClock>();
   } else {
     station.clock = std::make_unique<SystemClock>();

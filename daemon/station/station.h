@@ -34,10 +34,14 @@ struct Station {
   std::vector<ScanCamera> scan_cameras() const;
 };
 
+/// What time it is where everything is simulated: a scan that takes no time, or one that a person
+/// can follow. Real hardware has real time.
+enum class SimulatedTime { virtual_time, real_time };
+
 /// Opens the hardware, then each camera, locks its settings and reads its calibration if there is
 /// one. Errors name the part. `seed` and `threads` are the simulation's.
 Result<Station> open_station(const StationConfig& config, RoomSetting setting, std::uint64_t seed,
-                             int threads);
+                             int threads, SimulatedTime time = SimulatedTime::virtual_time);
 
 /// One camera of the configuration; `room` is needed for a simulated one.
 Result<std::unique_ptr<Camera>> open_camera(const CameraConfig& camera, SimulatedRoom* room,

@@ -196,6 +196,11 @@ std::vector<Error> invalid_values(const StationConfig& config) {
   if (config.calibration_valid_days < 1) {
     complain("station.calibration_valid_days", "must be at least 1");
   }
+  if (config.camera_check_s < 0) complain("station.camera_check_s", "must be 0 or more");
+  if (config.storage.folder.empty()) complain("storage.folder", "must name a folder");
+  if (config.storage.keep_days < 0) complain("storage.keep_days", "must be 0 or more");
+  if (config.jobs.memory_mib < 256) complain("jobs.memory_mib", "must be at least 256");
+  if (config.jobs.time_limit_min < 1) complain("jobs.time_limit_min", "must be at least 1");
   if (config.scan.passes < 1 || config.scan.passes > 3) complain("scan.passes", "must be 1 to 3");
   if (config.scan.jpeg_quality < 1 || config.scan.jpeg_quality > 100) {
     complain("scan.jpeg_quality", "must be 1 to 100");
@@ -226,6 +231,8 @@ void visit_config(StationConfig& config, ConfigFields& fields) {
     fields.field("calibration_folder", config.calibration_folder, "of calibration files");
     fields.field("calibration_valid_days", config.calibration_valid_days,
                  "older ones are reported as stale");
+    fields.field("camera_check_s", config.camera_check_s,
+                 "between two looks at idle cameras; 0: never");
   });
   fields.table("turntable", [&] { visit_turntable(config.turntable, fields); });
   fields.table("gpio", [&] { visit_gpio(config.gpio, fields); });
@@ -245,6 +252,17 @@ void visit_config(StationConfig& config, ConfigFields& fields) {
                  "what packages and the audit log are signed with (skullstation keys create)");
     fields.field("audit_log", config.evidence.audit_log,
                  "file of the station's audit log; empty: none is kept");
+  });
+  fields.table("storage", [&] {
+    fields.field("folder", config.storage.folder, "where skullstationd keeps its cases");
+    fields.field("keep_days", config.storage.keep_days,
+                 "after verified delivery, until a case's files are deleted; 0: for ever");
+  });
+  fields.table("jobs", [&] {
+    fields.field("quality", config.jobs.quality, {"draft", "standard", "fine"},
+                 "of skullstationd's models");
+    fields.field("memory_mib", config.jobs.memory_mib, "that a step may use");
+    fields.field("time_limit_min", config.jobs.time_limit_min, "after which a step is ended");
   });
 }
 

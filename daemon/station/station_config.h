@@ -71,6 +71,22 @@ struct EvidenceConfig {
   std::string audit_log;  ///< file; empty: none is kept
 };
 
+/// Where skullstationd keeps cases, and for how long.
+struct StorageConfig {
+  std::string folder = "/var/lib/skullstation";
+  /// After every delivery of a case was verified; 0: for ever.
+  int keep_days = 0;
+};
+
+enum class JobQuality { draft, standard, fine };
+
+/// How skullstationd makes models and faces of scans.
+struct JobsConfig {
+  JobQuality quality = JobQuality::standard;
+  int memory_mib = 6144;
+  int time_limit_min = 240;
+};
+
 /// The content of station.toml. What a file does not say keeps these defaults, which make a
 /// simulated station with two cameras.
 struct StationConfig {
@@ -79,6 +95,8 @@ struct StationConfig {
   /// Folder of camera-<id>.json and table.json.
   std::string calibration_folder = "calibration";
   int calibration_valid_days = 90;
+  /// While the station is idle; 0: cameras are looked at only when a scan begins.
+  int camera_check_s = 60;
   TurntableConfig turntable;
   GpioStationConfig gpio;
   std::vector<CameraConfig> cameras = simulated_pair();
@@ -88,6 +106,8 @@ struct StationConfig {
   QualityGates gates;
   SimulationConfig simulation;
   EvidenceConfig evidence;
+  StorageConfig storage;
+  JobsConfig jobs;
 
   static std::vector<CameraConfig> simulated_pair();
 };

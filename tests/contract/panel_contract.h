@@ -64,8 +64,8 @@ TEST_P(PanelContract, WaitingEndsOnAStopRequest) {
 TEST_P(PanelContract, EachSignalLightsItsLamp) {
   auto& lamp = *world().hardware().lamp;
   EXPECT_EQ(world().panel(), PanelState{}) << "dark until something is shown";
-  for (const Signal signal : {Signal::ready, Signal::working, Signal::attention, Signal::done,
-                              Signal::fault, Signal::off}) {
+  for (const Signal signal : {Signal::ready, Signal::working, Signal::attention, Signal::building,
+                              Signal::done, Signal::fault, Signal::off}) {
     ASSERT_TRUE(lamp.show(signal));
     EXPECT_EQ(world().panel(), panel_at(signal, 0ms)) << static_cast<int>(signal);
   }

@@ -4,10 +4,14 @@
 
 namespace skullstation::testing {
 
+/// Where a temporary folder lies: in memory what is tested makes thousands of files safe at no
+/// cost.
+enum class Medium { disk, memory };
+
 /// A fresh folder that is removed, with what is in it, at the end of the scope.
 class TemporaryFolder {
  public:
-  TemporaryFolder();
+  explicit TemporaryFolder(Medium medium = Medium::disk);
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;

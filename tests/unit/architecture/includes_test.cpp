@@ -49,10 +49,12 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"reconstruction/photogrammetry",
      {"core", "core/adjustment", "core/session", "reconstruction/io", "reconstruction/distance",
       "reconstruction/registration", "reconstruction/mesh"}},
-    {"daemon", {"daemon/cli", "reconstruction/rendering"}},
+    {"daemon", {"daemon/cli", "daemon/service", "reconstruction/rendering"}},
+    {"daemon/service", {"core", "core/session", "firmware_io", "daemon/station", "daemon/jobs"}},
     {"daemon/station",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
       "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/phantom"}},
+    {"daemon/jobs", {"core"}},
     {"daemon/report", {"core", "core/session", "reconstruction/rendering"}},
     {"daemon/subject",
      {"core", "core/session", "reconstruction/io", "reconstruction/rendering",
@@ -93,8 +95,9 @@ const std::map<std::string, std::set<std::string>> allowed = {
 
 /// Headers that take seconds to compile: for their own folder only, behind our own plain types.
 const std::vector<std::string> heavy = {
-    "CGAL/", "ceres/",     "opencv2/", "embree3/", "itk",          "gdcm",      "boost/", "exiv2/",
-    "gpiod", "libcamera/", "toml",     "CLI/",     "Eigen/Sparse", "nanoflann", "hdf5",   "hpdf"};
+    "CGAL/",        "ceres/",    "opencv2/", "embree3/",   "itk",    "gdcm",
+    "boost/",       "exiv2/",    "gpiod",    "libcamera/", "toml",   "CLI/",
+    "Eigen/Sparse", "nanoflann", "hdf5",     "hpdf",       "sqlite3"};
 
 struct Include {
   fs::path file;

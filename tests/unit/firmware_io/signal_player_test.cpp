@@ -10,8 +10,8 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::milliseconds;
 
-constexpr std::array signals{Signal::off,       Signal::ready, Signal::working,
-                             Signal::attention, Signal::done,  Signal::fault};
+constexpr std::array signals{Signal::off,      Signal::ready, Signal::working, Signal::attention,
+                             Signal::building, Signal::done,  Signal::fault};
 
 int beeps(Signal signal) {
   int count = 0;
@@ -30,6 +30,10 @@ TEST(SignalPattern, LooksAndSoundsAsTheOperatorLearnt) {
   EXPECT_EQ(panel_at(Signal::working, 700ms), (PanelState{.yellow = true}));
   EXPECT_EQ(panel_at(Signal::attention, 0ms), (PanelState{.yellow = true, .buzzer = true}));
   EXPECT_EQ(panel_at(Signal::attention, 9700ms), PanelState{}) << "blinks";
+  EXPECT_EQ(panel_at(Signal::building, 0ms),
+            (PanelState{.green = true, .yellow = true, .buzzer = true}));
+  EXPECT_EQ(panel_at(Signal::building, 9700ms), (PanelState{.green = true, .yellow = true}))
+      << "steady";
   EXPECT_EQ(panel_at(Signal::done, 0ms), (PanelState{.green = true, .buzzer = true}));
   EXPECT_EQ(panel_at(Signal::done, 9700ms), PanelState{}) << "blinks";
   EXPECT_EQ(panel_at(Signal::fault, 0ms), (PanelState{.red = true, .buzzer = true}));
@@ -37,6 +41,7 @@ TEST(SignalPattern, LooksAndSoundsAsTheOperatorLearnt) {
   EXPECT_EQ(beeps(Signal::ready), 0);
   EXPECT_EQ(beeps(Signal::working), 0);
   EXPECT_EQ(beeps(Signal::attention), 2);
+  EXPECT_EQ(beeps(Signal::building), 1);
   EXPECT_EQ(beeps(Signal::done), 1);
   EXPECT_EQ(beeps(Signal::fault), 3);
 }

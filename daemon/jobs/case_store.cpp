@@ -1,0 +1,504 @@
+#include "daemon/jobs/case_store.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <ctime>
+#include <fstream>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "core/file.h"
+
+namespace skullstation {
+
+namespace fs = std::filesystem;
+
+// The store itself: opening, scans, keeping. What happens to jobs is in case_jobs.cpp.
+
+namespace {
+
+constexpr int schema_version = 1;
+constexpr const char* schema = R"(
+CREATE TABLE cases (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  number TEXT NOT NULL,
+  created TEXT NOT NULL,
+  priority INTEGER NOT NULL DEFAULT 0,
+  hold TEXT,
+  verified TEXT,
+  removed TEXT);
+CREATE TABLE jobs (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  case_id INTEGER NOT NULL REFERENCES cases,
+  step TEXT NOT NULL,
+  options TEXT NOT NULL,
+  state TEXT NOT NULL CHECK (state IN ('waiting', 'running', 'done', 'failed', 'cancelled')),
+  interruptions INTEGER NOT NULL DEFAULT 0,
+  created TEXT NOT NULL,
+  started TEXT NOT NULL DEFAULT '',
+  ended TEXT NOT NULL DEFAULT '',
+  seconds REAL NOT NULL DEFAULT 0,
+  cpu_seconds REAL NOT NULL DEFAULT 0,
+  peak_mib REAL NOT NULL DEFAULT 0,
+  version TEXT NOT NULL DEFAULT '',
+  error TEXT NOT NULL DEFAULT '',
+  log TEXT NOT NULL DEFAULT '',
+  figures TEXT NOT NULL DEFAULT '');
+CREATE INDEX jobs_of_case ON jobs (case_id);
+-- One heavy step at a time, and one scan.
+CREATE UNIQUE INDEX one_running ON jobs (step = 'scan') WHERE state = 'running';
+CREATE TABLE inputs (
+  job INTEGER NOT NULL REFERENCES jobs,
+  name TEXT NOT NULL,
+  from_job INTEGER NOT NULL REFERENCES jobs,
+  PRIMARY KEY (job, name)) WITHOUT ROWID;
+CREATE TABLE files (
+  job INTEGER NOT NULL REFERENCES jobs,
+  path TEXT NOT NULL,
+  sha256 TEXT NOT NULL,
+  bytes INTEGER NOT NULL,
+  PRIMARY KEY (job, path)) WITHOUT ROWID;
+CREATE TABLE events (
+  sequence INTEGER PRIMARY KEY AUTOINCREMENT,
+  utc TEXT NOT NULL,
+  since_boot_s REAL NOT NULL,
+  boot TEXT NOT NULL,
+  case_id INTEGER,
+  what TEXT NOT NULL);
+PRAGMA user_version = 1;
+)";
+
+std::string boot_id() {
+  std::ifstream file("/proc/sys/kernel/random/boot_id");
+  std::string id;
+  std::getline(file, id);
+  return id;
+}
+
+double seconds_since_boot() {
+  timespec time{};
+  ::clock_gettime(CLOCK_BOOTTIME, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// The lock's descriptor; released by the kernel when the process ends, however it does.
+Result<int> lock_folder(const fs::path& folder) {
+  const fs::path file = folder / ".lock";
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (descriptor < 0) {
+    return fail(ErrorKind::bad_input, file.string(),
+                fmt::format("can't be written ({})", std::system_category().message(errno)));
+  }
+  // A daemon that was just killed may have left a child that is still on its way out.
+  for (int attempt = 0; ::flock(descriptor, LOCK_EX | LOCK_NB) != 0; ++attempt) {
+    if (attempt == 100) {
+      ::close(descriptor);
+      return fail(ErrorKind::bad_input, folder.string(), "is used by another skullstationd",
+                  "end that one, or choose another folder");
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return descriptor;
+}
+
+}  // namespace
+
+const char* to_string(JobState state) {
+  constexpr std::array names{"waiting", "running", "done", "failed", "cancelled"};
+  return names[static_cast<std::size_t>(state)];
+}
+
+const char* to_string(CaseState state) {
+  constexpr std::array names{"scanning", "building", "done", "failed", "cancelled"};
+  return names[static_cast<std::size_t>(state)];
+}
+
+CaseStore::CaseStore(fs::path folder, const Clock& clock, std::string version, int lock,
+                     Database database, BlobStore blobs)
+    : folder_(std::move(folder)),
+      clock_(clock),
+      version_(std::move(version)),
+      lock_(lock),
+      database_(std::move(database)),
+      blobs_(std::move(blobs)) {}
+
+CaseStore::~CaseStore() { ::close(lock_); }
+
+Result<std::unique_ptr<CaseStore>> CaseStore::open(const fs::path& folder, const Clock& clock,
+                                                   std::string version) {
+  if (auto made = make_writable_folder(folder); !made) return forward(made);
+  const auto lock = lock_folder(folder);
+  if (!lock) return forward(lock);
+  auto blobs = BlobStore::open(folder / "blobs");
+  auto database = Database::open(folder / "station.db");
+  if (!blobs || !database) {
+    ::close(*lock);
+    return !blobs ? forward(blobs) : forward(database);
+  }
+  std::unique_ptr<CaseStore> store(new CaseStore(folder, clock, std::move(version), *lock,
+                                                 *std::move(database), *std::move(blobs)));
+  if (auto begun = store->begin(); !begun) return forward(begun);
+  return store;
+}
+
+Result<void> CaseStore::begin() {
+  if (auto ready = make_tables(); !ready) return ready;
+  if (auto ready = take_up_interrupted_jobs(); !ready) return ready;
+  if (auto ready = remove_unnamed_blobs(); !ready) return ready;
+  std::error_code ignored;
+  fs::remove_all(folder_ / "work", ignored);  // of steps that a crash ended
+  return sync_folder(folder_);
+}
+
+Result<void> CaseStore::make_tables() {
+  const std::string file = (folder_ / "station.db").string();
+  if (const std::string damage = database_.damage(); !damage.empty()) {
+    return fail(ErrorKind::bad_input, file, "is damaged: " + damage, "put back a copy of it");
+  }
+  std::int64_t version = 0;
+  {
+    Statement query = database_.statement("PRAGMA user_version");
+    if (query.next()) version = query.integer();
+    if (auto read = query.done(); !read) return read;
+  }
+  if (version == schema_version) return {};
+  if (version != 0) {
+    return fail(ErrorKind::bad_input, file,
+                fmt::format("has format {}; this program knows {}", version, schema_version),
+                "install the version of Skullstation that wrote it");
+  }
+  Transaction transaction(database_);
+  if (auto made = database_.execute(schema); !made) return made;
+  return transaction.commit();
+}
+
+Result<void> CaseStore::remove_unnamed_blobs() {
+  std::set<std::string> named;
+  Statement query = database_.statement("SELECT DISTINCT sha256 FROM files");
+  while (query.next()) named.insert(query.text());
+  if (auto read = query.done(); !read) return read;
+  const auto removed = blobs_.remove_all_but(named);
+  if (!removed) return forward(removed);
+  return {};
+}
+
+/// Part of the surrounding transaction: an event is there if what it tells has happened.
+Result<void> CaseStore::note(std::int64_t case_id, const std::string& what) {
+  static const std::string boot = boot_id();
+  return database_
+      .statement(
+          "INSERT INTO events (utc, since_boot_s, boot, case_id, what) VALUES (?, ?, ?, ?, ?)")
+      .bind(now())
+      .bind(seconds_since_boot())
+      .bind(boot)
+      .bind(case_id)
+      .bind(what)
+      .done();
+}
+
+fs::path CaseStore::scan_folder(std::int64_t case_id) const {
+  return folder_ / "scans" / fmt::format("{}", case_id);
+}
+
+Result<Case> CaseStore::begin_scan(const std::string& number) {
+  const std::lock_guard lock(mutex_);
+  Transaction transaction(database_);
+  if (auto made = database_.statement("INSERT INTO cases (number, created) VALUES (?, ?)")
+                      .bind(number)
+                      .bind(now())
+                      .done();
+      !made) {
+    return forward(made);
+  }
+  const std::int64_t id = database_.last_id();
+  const auto scan = appoint(id, std::string(scan_step), "{}", {});
+  if (!scan) return forward(scan);
+  if (auto running =
+          database_.statement("UPDATE jobs SET state = 'running', started = ? WHERE id = ?")
+              .bind(now())
+              .bind(*scan)
+              .done();
+      !running) {
+    return forward(running);
+  }
+  if (auto noted = note(id, "scan begun: case " + number); !noted) return forward(noted);
+  if (auto committed = transaction.commit(); !committed) return forward(committed);
+  return case_of(id);
+}
+
+Result<std::optional<Job>> CaseStore::scan_of(std::int64_t case_id, JobState state) {
+  const auto all = jobs(case_id);
+  if (!all) return forward(all);
+  for (const Job& job : *all) {
+    if (job.step == scan_step && job.state == state) return job;
+  }
+  return std::nullopt;
+}
+
+Result<std::optional<Case>> CaseStore::unfinished_scan() {
+  const std::lock_guard lock(mutex_);
+  const auto scanning =
+      cases_where("id IN (SELECT case_id FROM jobs WHERE step = 'scan' AND state = 'running')", 0);
+  if (!scanning) return forward(scanning);
+  if (scanning->empty()) return std::nullopt;
+  return scanning->front();
+}
+
+Result<void> CaseStore::save_scan(std::int64_t case_id, const StepChain& chain) {
+  const std::lock_guard blobs_lock(blobs_mutex_);
+  const auto scan = scan_of(case_id, JobState::running);
+  if (!scan) return forward(scan);
+  if (!*scan)
+    return fail(ErrorKind::usage, fmt::format("case {}", case_id), "is not being scanned");
+  const auto taken = blobs_.take(scan_folder(case_id));
+  if (!taken) return forward(taken);
+  {
+    const std::lock_guard lock(mutex_);
+    Transaction transaction(database_);
+    if (auto named = name_files((*scan)->id, *taken); !named) return named;
+    if (auto done = database_
+                        .statement("UPDATE jobs SET state = 'done', ended = ?, version = ? "
+                                   "WHERE id = ?")
+                        .bind(now())
+                        .bind(version_)
+                        .bind((*scan)->id)
+                        .done();
+        !done) {
+      return done;
+    }
+    std::map<std::string, std::int64_t> made{{std::string(scan_step), (*scan)->id}};
+    for (const StepKind& kind : chain) {
+      std::map<std::string, std::int64_t> inputs;
+      for (const std::string& input : kind.inputs) inputs[input] = made.at(input);
+      const auto id = appoint(case_id, kind.name, kind.options, inputs);
+      if (!id) return forward(id);
+      made[kind.name] = *id;
+    }
+    if (auto noted = note(case_id, fmt::format("scan saved: {} files", taken->size())); !noted) {
+      return noted;
+    }
+    if (auto committed = transaction.commit(); !committed) return committed;
+  }
+  // The blobs hold the content now; a folder that stays is only a second name for it.
+  std::error_code ignored;
+  fs::remove_all(scan_folder(case_id), ignored);
+  return {};
+}
+
+Result<void> CaseStore::give_up_scan(std::int64_t case_id) {
+  const std::lock_guard lock(mutex_);
+  const auto scan = scan_of(case_id, JobState::running);
+  if (!scan) return forward(scan);
+  if (!*scan)
+    return fail(ErrorKind::usage, fmt::format("case {}", case_id), "is not being scanned");
+  Transaction transaction(database_);
+  if (auto done = database_.statement("UPDATE jobs SET state = 'cancelled', ended = ? WHERE id = ?")
+                      .bind(now())
+                      .bind((*scan)->id)
+                      .done();
+      !done) {
+    return done;
+  }
+  if (auto noted = note(case_id, "scan given up"); !noted) return noted;
+  return transaction.commit();
+}
+
+Result<void> CaseStore::name_files(std::int64_t job, const std::vector<ArtifactFile>& files) {
+  for (const ArtifactFile& file : files) {
+    if (auto named =
+            database_.statement("INSERT INTO files (job, path, sha256, bytes) VALUES (?, ?, ?, ?)")
+                .bind(job)
+                .bind(file.path)
+                .bind(file.sha256)
+                .bind(static_cast<std::int64_t>(file.bytes))
+                .done();
+        !named) {
+      return named;
+    }
+  }
+  return {};
+}
+
+Result<std::vector<ArtifactFile>> CaseStore::files(std::int64_t job) {
+  const std::lock_guard lock(mutex_);
+  std::vector<ArtifactFile> found;
+  Statement query =
+      database_.statement("SELECT path, sha256, bytes FROM files WHERE job = ? ORDER BY path");
+  query.bind(job);
+  while (query.next()) {
+    std::string path = query.text();
+    std::string sha256 = query.text();
+    found.push_back(
+        {std::move(path), std::move(sha256), static_cast<std::uint64_t>(query.integer())});
+  }
+  if (auto read = query.done(); !read) return forward(read);
+  return found;
+}
+
+Result<void> CaseStore::lay_out(std::int64_t job, const fs::path& to) {
+  const auto list = files(job);
+  if (!list) return forward(list);
+  return blobs_.lay_out(*list, to);
+}
+
+Result<std::vector<Case>> CaseStore::cases_where(const std::string& condition, std::int64_t value) {
+  const std::lock_guard lock(mutex_);
+  std::vector<Case> found;
+  Statement query = database_.statement(
+      "SELECT id, number, created, priority, hold, verified, removed FROM cases WHERE " +
+      condition + " ORDER BY id");
+  if (condition.find('?') != std::string::npos) query.bind(value);
+  while (query.next()) {
+    Case& row = found.emplace_back();
+    row.id = query.integer();
+    row.number = query.text();
+    row.created = query.text();
+    row.priority = static_cast<int>(query.integer());
+    row.hold = query.optional_text();
+    row.verified = query.optional_text();
+    row.removed = query.optional_text();
+  }
+  if (auto read = query.done(); !read) return forward(read);
+  for (Case& row : found) {
+    const auto all = jobs(row.id);
+    if (!all) return forward(all);
+    row.state = CaseState::done;
+    const auto any = [&](JobState state, bool scan) {
+      return std::ranges::any_of(current_jobs(*all), [&](const Job& job) {
+        return job.state == state && (job.step == scan_step) == scan;
+      });
+    };
+    if (any(JobState::running, true)) {
+      row.state = CaseState::scanning;
+    } else if (any(JobState::failed, false)) {
+      row.state = CaseState::failed;
+    } else if (any(JobState::cancelled, true) || any(JobState::cancelled, false)) {
+      row.state = CaseState::cancelled;
+    } else if (any(JobState::waiting, false) || any(JobState::running, false)) {
+      row.state = CaseState::building;
+    }
+  }
+  return found;
+}
+
+Result<std::vector<Case>> CaseStore::cases() { return cases_where("1", 0); }
+
+Result<Case> CaseStore::case_of(std::int64_t case_id) {
+  auto found = cases_where("id = ?", case_id);
+  if (!found) return forward(found);
+  if (found->empty()) {
+    return fail(ErrorKind::usage, fmt::format("case {}", case_id), "there is no such case");
+  }
+  return found->front();
+}
+
+Result<void> CaseStore::set_priority(std::int64_t case_id, int priority) {
+  const std::lock_guard lock(mutex_);
+  if (auto known = case_of(case_id); !known) return forward(known);
+  return database_.statement("UPDATE cases SET priority = ? WHERE id = ?")
+      .bind(std::int64_t{priority})
+      .bind(case_id)
+      .done();
+}
+
+Result<void> CaseStore::set_hold(std::int64_t case_id, const std::optional<std::string>& reason) {
+  const std::lock_guard lock(mutex_);
+  if (auto known = case_of(case_id); !known) return forward(known);
+  Transaction transaction(database_);
+  if (auto set = database_.statement("UPDATE cases SET hold = ? WHERE id = ?")
+                     .bind_optional(reason)
+                     .bind(case_id)
+                     .done();
+      !set) {
+    return set;
+  }
+  if (auto noted = note(case_id, reason ? "held: " + *reason : "no longer held"); !noted) {
+    return noted;
+  }
+  return transaction.commit();
+}
+
+Result<void> CaseStore::set_verified(std::int64_t case_id) {
+  const std::lock_guard lock(mutex_);
+  if (auto known = case_of(case_id); !known) return forward(known);
+  Transaction transaction(database_);
+  if (auto set = database_.statement("UPDATE cases SET verified = ? WHERE id = ?")
+                     .bind(now())
+                     .bind(case_id)
+                     .done();
+      !set) {
+    return set;
+  }
+  if (auto noted = note(case_id, "delivered and verified"); !noted) return noted;
+  return transaction.commit();
+}
+
+Result<std::vector<std::int64_t>> CaseStore::remove_expired(std::chrono::seconds term) {
+  const std::lock_guard blobs_lock(blobs_mutex_);
+  const std::lock_guard lock(mutex_);
+  // ISO 8601 of one time zone sorts as the times do.
+  const std::string before = to_iso8601(clock_.utc_now() - term);
+  const auto all = cases();
+  if (!all) return forward(all);
+  std::vector<std::int64_t> removed;
+  Transaction transaction(database_);
+  for (const Case& row : *all) {
+    const bool expired = row.verified && *row.verified <= before;
+    const bool at_work = row.state == CaseState::scanning || row.state == CaseState::building;
+    if (!expired || at_work || row.hold || row.removed) continue;
+    if (auto gone = database_
+                        .statement("DELETE FROM files WHERE job IN "
+                                   "(SELECT id FROM jobs WHERE case_id = ?)")
+                        .bind(row.id)
+                        .done();
+        !gone) {
+      return forward(gone);
+    }
+    if (auto marked = database_.statement("UPDATE cases SET removed = ? WHERE id = ?")
+                          .bind(now())
+                          .bind(row.id)
+                          .done();
+        !marked) {
+      return forward(marked);
+    }
+    if (auto noted = note(row.id, "files deleted: verified " + *row.verified); !noted) {
+      return forward(noted);
+    }
+    removed.push_back(row.id);
+  }
+  if (auto committed = transaction.commit(); !committed) return forward(committed);
+  // Rows first: a crash in between leaves blobs that no row names, and the next start removes them.
+  if (auto swept = remove_unnamed_blobs(); !swept) return forward(swept);
+  return removed;
+}
+
+std::vector<std::string> CaseStore::damage(bool thorough) {
+  const std::lock_guard blobs_lock(blobs_mutex_);
+  std::vector<std::string> found;
+  std::vector<ArtifactFile> all;
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::string wrong = database_.damage(); !wrong.empty()) found.push_back(std::move(wrong));
+    Statement query = database_.statement("SELECT path, sha256, bytes FROM files");
+    while (query.next()) {
+      std::string path = query.text();
+      std::string sha256 = query.text();
+      all.push_back(
+          {std::move(path), std::move(sha256), static_cast<std::uint64_t>(query.integer())});
+    }
+    if (auto read = query.done(); !read) found.push_back(read.error().message());
+  }
+  for (const ArtifactFile& file : all) {
+    if (auto sound = blobs_.check(file, thorough); !sound) found.push_back(sound.error().message());
+  }
+  return found;
+}
+
+}  // namespace skullstation

@@ -1,0 +1,109 @@
+// The `skullstationd` program: a station at work. What it does is in daemon/service.
+
+#include <fmt/format.h>
+#include <systemd/sd-daemon.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include "daemon/cli/terminal.h"
+#include "daemon/service/control_commands.h"
+#include "daemon/service/control_socket.h"
+#include "daemon/service/station_service.h"
+
+namespace {
+
+using namespace skullstation;
+
+struct DaemonOptions {
+  std::filesystem::path config;
+  bool simulate = false;
+  std::string storage;
+  std::filesystem::path step_program;
+  int threads = 0;
+  std::uint64_t seed = 1;
+};
+
+/// The program beside this one.
+std::filesystem::path skullstation_beside() {
+  return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "skullstation";
+}
+
+Result<ServiceOptions> service_options(const DaemonOptions& options) {
+  if (options.config.empty() && !options.simulate) {
+    return fail(ErrorKind::usage, "skullstationd", "has no configuration",
+                "name one with --config, or try it with --simulate");
+  }
+  const auto config = read_config(options.config);
+  if (!config) return forward(config);
+  ServiceOptions service;
+  service.config = *config;
+  if (options.simulate) {
+    service.config.backend = StationBackend::simulated;
+    for (CameraConfig& camera : service.config.cameras) camera.backend = CameraBackend::simulated;
+    if (options.config.empty()) service.config.storage.folder = "out/station";
+  }
+  if (!options.storage.empty()) service.config.storage.folder = options.storage;
+  // Steps have working folders of their own: no path may depend on where the daemon was started.
+  service.config.storage.folder =
+      std::filesystem::absolute(service.config.storage.folder).lexically_normal().string();
+  const auto program = options.step_program.empty()
+                           ? skullstation_beside()
+                           : std::filesystem::absolute(options.step_program);
+  service.step_command = {program.string()};
+  if (options.step_program.empty()) service.step_command.emplace_back("step");
+  service.version = SKULLSTATION_VERSION;
+  service.threads = options.threads;
+  service.seed = options.seed;
+  return service;
+}
+
+Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
+  const auto service_with = service_options(options);
+  if (!service_with) return forward(service_with);
+  const auto service = StationService::open(*service_with);
+  if (!service) return forward(service);
+  const std::filesystem::path socket =
+      std::filesystem::path(service_with->config.storage.folder) / "control";
+  const auto control = ControlSocket::open(
+      socket, [&service](const std::string& line) { return answer_control(**service, line); });
+  if (!control) return forward(control);
+  fmt::print(stderr, "station {}: cases in {}\n", service_with->config.station_id,
+             service_with->config.storage.folder);
+  sd_notify(0, "READY=1");
+  (*service)->run(stop, [] { sd_notify(0, "WATCHDOG=1"); });
+  sd_notify(0, "STOPPING=1");
+  return {};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const StopOnSignal stop;  // before any other thread
+  CLI::App app{"skullstationd: a station at work, with its button, its lamps and its jobs"};
+  app.set_version_flag("--version", SKULLSTATION_VERSION);
+  DaemonOptions options;
+  app.add_option("--config", options.config, "station.toml");
+  app.add_flag("--simulate", options.simulate,
+               "without hardware: a simulated station in real time");
+  app.add_option("--storage", options.storage,
+                 "folder of the cases, instead of the configuration's (simulated without "
+                 "configuration: out/station)");
+  app.add_option("--step-program", options.step_program,
+                 "makes the steps instead of `skullstation step`; for tests");
+  app.add_option("--threads", options.threads, "of a step; 0: all")->check(CLI::Range(0, 1024));
+  app.add_option("--seed", options.seed, "of everything random")->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const bool asked_for_help = error.get_exit_code() == 0;
+    app.exit(error);
+    return asked_for_help ? 0 : exit_code(ErrorKind::usage);
+  }
+  const auto served = serve(options, stop.token());
+  if (served) return 0;
+  fmt::print(stderr, "skullstationd: {}\n", served.error().message());
+  return exit_code(served.error().kind);
+}

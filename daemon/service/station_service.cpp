@@ -1,0 +1,425 @@
+#include "daemon/service/station_service.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <utility>
+
+#include "core/file.h"
+#include "core/session/session.h"
+#include "daemon/station/scan_workflow.h"
+
+namespace skullstation {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr auto door_open = "door open";
+
+StepChain chain_of(const JobsConfig& jobs) {
+  constexpr std::array quality{"draft", "standard", "fine"};
+  StepLimits limits;
+  limits.memory_bytes = static_cast<std::uint64_t>(jobs.memory_mib) << 20;
+  limits.time = std::chrono::minutes(jobs.time_limit_min);
+  limits.cpu_time = 4 * limits.time;
+  return station_chain(quality.at(static_cast<std::size_t>(jobs.quality)), limits);
+}
+
+void sleep_for(std::chrono::milliseconds time, const std::stop_token& stop) {
+  SystemClock().sleep_for(time, stop);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<StationService>> StationService::open(const ServiceOptions& options) {
+  std::unique_ptr<StationService> service(new StationService(options));
+  auto store = CaseStore::open(options.config.storage.folder, service->clock_, options.version);
+  if (!store) return forward(store);
+  service->store_ = *std::move(store);
+  service->chain_ = chain_of(options.config.jobs);
+  EngineOptions engine;
+  engine.chain = service->chain_;
+  engine.step_command = options.step_command;
+  engine.threads = options.threads;
+  engine.seed = options.seed;
+  service->engine_ = std::make_unique<JobEngine>(*service->store_, engine,
+                                                 [raw = service.get()](JobNews news, std::int64_t) {
+                                                   switch (news) {
+                                                     case JobNews::begun:
+                                                       return raw->tell(StationEvent::jobs_waiting);
+                                                     case JobNews::case_done:
+                                                       return raw->tell(StationEvent::case_done);
+                                                     case JobNews::case_failed:
+                                                       return raw->tell(StationEvent::case_failed);
+                                                     case JobNews::all_ended:
+                                                       return raw->tell(StationEvent::jobs_ended);
+                                                   }
+                                                 });
+  return service;
+}
+
+StationService::~StationService() {
+  if (station_) station_->hardware.interlock->on_trip({});
+  scan_stop_.request_stop();
+}
+
+void StationService::tell(StationEvent event) {
+  {
+    const std::lock_guard lock(mutex_);
+    events_.push_back(event);
+  }
+  changed_.notify_all();
+}
+
+void StationService::say(std::string message) {
+  fmt::print(stderr, "{}\n", message);
+  const std::lock_guard lock(mutex_);
+  status_.message = std::move(message);
+}
+
+StationStatus StationService::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+void StationService::set_case_number(std::string number) {
+  const std::lock_guard lock(mutex_);
+  next_number_ = std::move(number);
+}
+
+Station* StationService::station() const {
+  const std::lock_guard lock(mutex_);
+  return station_.get();
+}
+
+SimulatedStation* StationService::simulated() const {
+  const Station* open = station();
+  return open == nullptr || !open->room ? nullptr : &open->room->station();
+}
+
+void StationService::run(const std::stop_token& stop, const std::function<void()>& alive) {
+  act(StationAction::open);
+  auto next_removal = clock_.now();
+  while (status().state != StationState::stopped) {
+    alive();
+    if (clock_.now() >= next_removal) {
+      remove_expired();
+      next_removal = clock_.now() + 1h;
+    }
+    std::optional<StationEvent> event;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait_for(lock, stop, 500ms, [this] { return !events_.empty(); });
+      if (stop.stop_requested()) {
+        event = StationEvent::shut_down;
+      } else if (!events_.empty()) {
+        event = events_.front();
+        events_.pop_front();
+      }
+    }
+    if (event) walk(*event);
+  }
+  if (worker_.joinable()) worker_.join();
+}
+
+void StationService::walk(StationEvent event) {
+  const Transition* transition = find_transition(status().state, event);
+  if (transition == nullptr) return;
+  fmt::print(stderr, "{}: {} -> {}\n", to_string(event), to_string(transition->from),
+             to_string(transition->to));
+  {
+    const std::lock_guard lock(mutex_);
+    status_.state = transition->to;
+    status_.signal = transition->signal;
+    if (event == StationEvent::case_done) status_.message = "A case is ready.";
+    if (event == StationEvent::case_failed) {
+      status_.message = "A case could not be built: see the list of cases.";
+    }
+  }
+  if (event == StationEvent::stop_pressed || event == StationEvent::door_opened) {
+    if (Station* open = station()) {
+      say(fmt::format("Stopped: {}. Make the station safe, then press the button.",
+                      open->hardware.interlock->reason()));
+    }
+  }
+  if (Station* open = station()) {
+    if (const auto shown = open->hardware.lamp->show(transition->signal); !shown) {
+      fmt::print(stderr, "{}\n", shown.error().message());
+    }
+  }
+  act(transition->action);
+}
+
+void StationService::act(StationAction action) {
+  switch (action) {
+    case StationAction::none: return;
+    case StationAction::open: return work([this] { open_parts(false); });
+    case StationAction::reset_and_open: return work([this] { open_parts(true); });
+    case StationAction::begin_scan: return work([this] { scan(false); });
+    case StationAction::resume_scan: return work([this] { scan(true); });
+    case StationAction::confirm_placement:
+    case StationAction::cancel_scan: {
+      {
+        const std::lock_guard lock(mutex_);
+        (action == StationAction::cancel_scan ? given_up_ : confirmed_) = true;
+        if (given_up_) scan_stop_.request_stop();
+      }
+      return changed_.notify_all();
+    }
+    case StationAction::look_for_jobs: {
+      const auto outstanding = store_->outstanding();
+      if (outstanding && !outstanding->empty()) tell(StationEvent::jobs_waiting);
+      return;
+    }
+    case StationAction::halt_scan:
+    case StationAction::stop: {
+      const std::lock_guard lock(mutex_);
+      scan_stop_.request_stop();
+      return;
+    }
+  }
+}
+
+void StationService::work(std::function<void()> task) {
+  worker_ = std::jthread([task = std::move(task), before = std::move(worker_)]() mutable {
+    if (before.joinable()) before.join();
+    task();
+  });
+}
+
+void StationService::open_parts(bool reset) {
+  if (station() == nullptr) {
+    auto opened = open_station(options_.config, RoomSetting::specimen_on_table, options_.seed,
+                               options_.threads, SimulatedTime::real_time);
+    if (!opened) {
+      say(opened.error().message());
+      return tell(StationEvent::not_opened);
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      station_ = std::make_unique<Station>(*std::move(opened));
+    }
+    Interlock& interlock = *station_->hardware.interlock;
+    interlock.on_trip([this, &interlock] {
+      tell(interlock.reason() == door_open ? StationEvent::door_opened
+                                           : StationEvent::stop_pressed);
+    });
+    button_ = std::jthread([this](const std::stop_token& stop) { watch_button(stop); });
+    if (options_.config.camera_check_s > 0) {
+      cameras_ = std::jthread([this](const std::stop_token& stop) { watch_cameras(stop); });
+    }
+  } else {
+    const std::lock_guard lock(cameras_mutex_);
+    for (StationCamera& camera : station_->cameras) {
+      if (const auto back = camera.camera->reopen(); !back) {
+        say(fmt::format("camera \"{}\": {}", camera.config.id, back.error().message()));
+        return tell(StationEvent::not_opened);
+      }
+    }
+  }
+  Interlock& interlock = *station_->hardware.interlock;
+  if (reset && interlock.tripped()) {
+    if (const auto unlatched = interlock.reset(); !unlatched) {
+      say(unlatched.error().message());
+      return tell(StationEvent::not_opened);
+    }
+  }
+  if (interlock.tripped() && interlock.reason() != door_open) {
+    say(interlock.reason() + ": make the station safe, then press the button");
+    return tell(StationEvent::not_opened);
+  }
+  const auto resume = scan_to_resume();
+  if (!resume) {
+    say(resume.error().message());
+    return tell(StationEvent::not_opened);
+  }
+  if (!*resume) say("Lay the next specimen upright on the board, then press the button.");
+  tell(*resume ? StationEvent::unfinished_scan : StationEvent::opened);
+}
+
+/// A scan that was begun and has pictures. One without any is given up: nothing is lost, and the
+/// platter must not turn before somebody has pressed the button.
+Result<bool> StationService::scan_to_resume() {
+  const auto unfinished = store_->unfinished_scan();
+  if (!unfinished) return forward(unfinished);
+  if (!*unfinished) return false;
+  const auto folder = store_->scan_folder((*unfinished)->id);
+  if (std::filesystem::exists(folder / "session.json")) {
+    const auto session = read_session(folder);
+    if (!session) return forward(session);
+    if (!session->views.empty()) return true;
+  }
+  if (auto given_up = store_->give_up_scan((*unfinished)->id); !given_up) return forward(given_up);
+  return false;
+}
+
+/// The case that is about to be scanned; nothing if the scan can't begin yet (the message says
+/// why).
+Result<std::optional<Case>> StationService::begin_case() {
+  Interlock& interlock = *station_->hardware.interlock;
+  if (interlock.tripped()) {
+    // The door had to be opened to lay the specimen down.
+    if (const auto closed = interlock.reset(); !closed) {
+      say(closed.error().message());
+      return std::nullopt;
+    }
+  }
+  std::uint64_t needed = scan_space_bytes(options_.config) * 13 / 10;
+  std::uint64_t largest_step = 0;
+  for (const StepKind& kind : chain_) largest_step = std::max(largest_step, kind.space_bytes);
+  needed += largest_step;
+  const auto free = free_space_bytes(store_->folder());
+  if (!free) return forward(free);
+  if (*free < needed) {
+    say(fmt::format("{}: a scan and its models may need {} MiB, {} are free; free some space",
+                    store_->folder().string(), needed >> 20, *free >> 20));
+    return std::nullopt;
+  }
+  std::string number;
+  {
+    const std::lock_guard lock(mutex_);
+    number = std::exchange(next_number_, {});
+  }
+  if (number.empty()) {
+    const auto known = store_->cases();
+    if (!known) return forward(known);
+    number = fmt::format("{:%Y-%m-%d}-{:04}",
+                         fmt::gmtime(std::chrono::system_clock::to_time_t(clock_.utc_now())),
+                         known->size() + 1);
+  }
+  auto begun = store_->begin_scan(number);
+  if (!begun) return forward(begun);
+  return *std::move(begun);
+}
+
+void StationService::scan(bool resume) {
+  const std::lock_guard cameras_lock(cameras_mutex_);
+  auto owner = resume ? store_->unfinished_scan() : begin_case();
+  if (!owner) {
+    say(owner.error().message());
+    return tell(StationEvent::scan_refused);
+  }
+  if (!*owner) return tell(StationEvent::scan_refused);
+  const Case scanned = **owner;
+  std::stop_source stop;
+  {
+    const std::lock_guard lock(mutex_);
+    // Who has shut the station down meanwhile did not know of this scan.
+    if (status_.state == StationState::stopped) stop.request_stop();
+    scan_stop_ = stop;
+    given_up_ = false;
+    status_.scanning = scanned.id;
+    status_.scan_fraction = 0.0;
+    status_.message = fmt::format("Case {} is being photographed: hands off.", scanned.number);
+  }
+  Progress progress;
+  progress.stop = stop.get_token();
+  progress.report = [this](double fraction, std::string_view stage) {
+    const std::lock_guard lock(mutex_);
+    status_.scan_fraction = fraction;
+    status_.scan_stage = stage;
+  };
+  const auto report = photograph_specimen(
+      options_.config, *station_, scanned.number, store_->scan_folder(scanned.id),
+      [this](const PlacementRequest& request, const std::stop_token& asked_to_stop) {
+        return ask_for_placement(request, asked_to_stop);
+      },
+      progress);
+  bool given_up = false;
+  {
+    const std::lock_guard lock(mutex_);
+    given_up = given_up_;
+    status_.scanning.reset();
+  }
+  Result<void> kept;
+  if (report) {
+    kept = store_->save_scan(scanned.id, chain_);
+    if (kept) {
+      engine_->wake();
+      say(fmt::format("Case {} is saved. The next specimen may come.", scanned.number));
+      return tell(StationEvent::scan_saved);
+    }
+  } else if (given_up) {
+    kept = store_->give_up_scan(scanned.id);
+    if (kept) {
+      say(fmt::format("The scan of case {} was given up.", scanned.number));
+      return tell(StationEvent::scan_cancelled);
+    }
+  }
+  say((report ? kept.error() : report.error()).message());
+  tell(StationEvent::scan_failed);
+}
+
+Result<void> StationService::ask_for_placement(const PlacementRequest& request,
+                                               const std::stop_token& stop) {
+  {
+    const std::lock_guard lock(mutex_);
+    confirmed_ = false;
+  }
+  say(placement_prompt(request));
+  tell(StationEvent::placement_wanted);
+  std::unique_lock lock(mutex_);
+  if (changed_.wait(lock, stop, [this] { return confirmed_; })) return {};
+  return fail(ErrorKind::cancelled, "scan", "stopped on request");
+}
+
+void StationService::watch_button(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    const auto press = station_->hardware.button->wait_for_press(1s, stop);
+    if (!press) {
+      fmt::print(stderr, "button: {}\n", press.error().message());
+      sleep_for(1s, stop);
+    } else if (*press) {
+      tell(**press == Press::brief ? StationEvent::go : StationEvent::cancel);
+    }
+  }
+}
+
+/// A camera that was unplugged is told of before the next specimen lies on the table.
+void StationService::watch_cameras(const std::stop_token& stop) {
+  bool lost = false;
+  const auto period = std::chrono::seconds(options_.config.camera_check_s);
+  while (clock_.sleep_for(period, stop)) {
+    const std::unique_lock lock(cameras_mutex_, std::try_to_lock);
+    const StationState state = status().state;
+    const bool idle = state == StationState::ready || state == StationState::building ||
+                      state == StationState::result;
+    if (!lock || (!idle && !(lost && state == StationState::fault))) continue;
+    std::string trouble;
+    for (StationCamera& camera : station_->cameras) {
+      Camera& device = *camera.camera;
+      if (lost && !device.reopen()) {
+        trouble = camera.config.id;
+        continue;
+      }
+      const auto frame =
+          device.frame_after(station_->clock->now(), options_.config.scan.frame_timeout, stop);
+      if (!frame && !stop.stop_requested()) {
+        trouble = fmt::format("camera \"{}\": {}", camera.config.id, frame.error().message());
+      }
+    }
+    if (!trouble.empty() && !lost) {
+      say(trouble);
+      tell(StationEvent::camera_lost);
+    }
+    if (trouble.empty() && lost) tell(StationEvent::camera_back);
+    lost = !trouble.empty();
+  }
+}
+
+void StationService::remove_expired() {
+  const int days = options_.config.storage.keep_days;
+  if (days == 0) return;
+  const auto removed = store_->remove_expired(std::chrono::days(days));
+  if (!removed) {
+    fmt::print(stderr, "{}\n", removed.error().message());
+  } else if (!removed->empty()) {
+    fmt::print(stderr, "{} cases were deleted: delivered, verified, expired\n", removed->size());
+  }
+}
+
+}  // namespace skullstation

@@ -1,0 +1,339 @@
+// `skullstationd` on a small simulated station, with steps that are quick: from the button to the
+// result, the next specimen meanwhile, what a person at the station can do wrong, and kill -9.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "core/file.h"
+#include "core/random.h"
+#include "tests/e2e/small_station.h"
+#include "tests/support/process.h"
+#include "tests/support/steps.h"
+#include "tests/support/temporary_folder.h"
+
+namespace skullstation {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using nlohmann::json;
+using skullstation::testing::Medium;
+using skullstation::testing::Process;
+using skullstation::testing::TemporaryFolder;
+using ::testing::HasSubstr;
+
+sockaddr_un address_of(const fs::path& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+  return address;
+}
+
+class Daemon : public ::testing::Test {
+ protected:
+  void TearDown() override {
+    if (HasFailure() && daemon_) {
+      daemon_->send(SIGKILL);
+      std::cerr << daemon_->wait().err;
+    }
+  }
+
+  /// Writes the configuration: a turntable that is quick in real time.
+  void configure(const std::string& camera = "", const std::string& station = "") {
+    skullstation::testing::SmallStation small;
+    small.views_per_ring = 2;
+    small.camera = camera;
+    small.extra =
+        "[turntable]\nsteps_per_turn = 200\nmax_speed_deg_s = 1000\n"
+        "max_acceleration_deg_s2 = 20000\nmax_jerk_deg_s3 = 2000000\nhome_speed_deg_s = 700\n";
+    config_ = write_small_station(folder_.path(), small);
+    auto text = *read_file(config_);
+    text.insert(text.find("[scan]\n") + 7, "settle_ms = 0\n");
+    text.insert(text.find("[station]\n") + 10, station);
+    ASSERT_TRUE(write_file_durably(config_, text));
+  }
+
+  std::vector<std::string> command() const {
+    const auto bin = skullstation::testing::skullstation_program().parent_path();
+    return {(bin / "skullstationd").string(),
+            "--config",
+            config_.string(),
+            "--storage",
+            storage().string(),
+            "--step-program",
+            (bin / "fake_step").string()};
+  }
+  fs::path storage() const { return folder_ / "store"; }
+  void start() { daemon_ = std::make_unique<Process>(command()); }
+
+  /// The answer to a line; null if nobody answers.
+  json ask(const std::string& line) const {
+    const int client = ::socket(AF_UNIX, SOCK_STREAM, 0);
+    const sockaddr_un address = address_of(storage() / "control");
+    std::string text;
+    if (::connect(client, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+      const std::string sent = line + "\n";
+      static_cast<void>(!::send(client, sent.data(), sent.size(), MSG_NOSIGNAL));
+      char c = 0;
+      while (::read(client, &c, 1) == 1) text += c;
+    }
+    ::close(client);
+    return json::parse(text, nullptr, false);
+  }
+  std::string state() const {
+    const json status = ask("status");
+    return status.is_object() ? status.value("state", "") : "";
+  }
+  std::string message() const { return ask("status").value("message", ""); }
+  std::string signal() const { return ask("status").value("signal", ""); }
+  bool becomes(const std::string& wanted) const {
+    const bool became = skullstation::testing::comes_true([&] { return state() == wanted; }, 300s);
+    if (!became) ADD_FAILURE() << "still " << ask("status").dump() << ", not " << wanted;
+    return became;
+  }
+  json cases() const { return ask("cases")["cases"]; }
+  json job(int case_id, const std::string& step) const {
+    const json answer = ask(fmt::format("jobs {}", case_id));
+    for (const json& row : answer["jobs"]) {
+      if (row["step"] == step) return row;
+    }
+    return {};
+  }
+  /// As the store has it: the views of the case's session, after a look at every image.
+  std::size_t views_of(int case_id) const {
+    const int scan = job(case_id, "scan")["id"];
+    std::size_t images = 0;
+    std::size_t views = 0;
+    const json answer = ask(fmt::format("files {}", scan));
+    for (const json& file : answer["files"]) {
+      const auto bytes = read_file(file["blob"].get<std::string>());
+      EXPECT_TRUE(bytes);
+      EXPECT_EQ(sha256_hex(*bytes), file["sha256"]);
+      if (file["path"].get<std::string>().starts_with("images/")) ++images;
+      if (file["path"] == "session.json") {
+        const json session = json::parse(*bytes);
+        EXPECT_TRUE(session["complete"]);
+        views = session["views"].size();
+      }
+    }
+    EXPECT_EQ(images, views);
+    return views;
+  }
+  /// Steps wait as long as this file is there.
+  void hold_steps() { std::ofstream(folder_ / "store" / "hold-steps") << "x"; }
+  void release_steps() { fs::remove(folder_ / "store" / "hold-steps"); }
+  void end() {
+    daemon_->send(SIGTERM);
+    const auto result = daemon_->wait();
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    daemon_.reset();
+  }
+
+  TemporaryFolder folder_{Medium::memory};
+  fs::path config_;
+  std::unique_ptr<Process> daemon_;
+};
+
+TEST_F(Daemon, FromButtonToResultAndTheNextSpecimenMeanwhile) {
+  configure();
+  start();
+  ASSERT_TRUE(becomes("ready"));
+  hold_steps();
+  ask("number 2026-0042");
+  ask("press");
+  ASSERT_TRUE(becomes("turn-over"));
+  EXPECT_EQ(signal(), "attention");
+  EXPECT_THAT(message(), HasSubstr("Lay the specimen upside down on the board"));
+  ask("press");
+  ASSERT_TRUE(becomes("building"));
+  EXPECT_EQ(signal(), "building");
+  EXPECT_THAT(message(), HasSubstr("Case 2026-0042 is saved"));
+  EXPECT_EQ(views_of(1), 8U);
+
+  ask("press");  // the next specimen, while the first case waits for its step
+  ASSERT_TRUE(becomes("turn-over"));
+  EXPECT_EQ(ask("status")["job"]["case"], 1) << "the step goes on meanwhile";
+  ask("press");
+  ASSERT_TRUE(becomes("building"));
+  EXPECT_EQ(cases()[0]["state"], "building");
+  EXPECT_EQ(cases()[1]["state"], "building");
+
+  release_steps();
+  ASSERT_TRUE(becomes("result"));
+  EXPECT_EQ(signal(), "done");
+  ASSERT_TRUE(skullstation::testing::comes_true([&] { return cases()[1]["state"] == "done"; }));
+  EXPECT_EQ(cases()[0]["number"], "2026-0042");
+  EXPECT_EQ(cases()[0]["state"], "done");
+  EXPECT_EQ(job(1, "approximate")["state"], "done");
+  EXPECT_EQ(views_of(2), 8U);
+  ask("hold");  // seen
+  ASSERT_TRUE(becomes("ready"));
+  end();
+}
+
+TEST_F(Daemon, AHeldPressGivesTheScanUp) {
+  configure();
+  start();
+  ASSERT_TRUE(becomes("ready"));
+  ask("press");
+  ASSERT_TRUE(becomes("turn-over"));
+  ask("hold");
+  ASSERT_TRUE(becomes("ready"));
+  EXPECT_EQ(cases()[0]["state"], "cancelled");
+  ask("press");
+  ASSERT_TRUE(becomes("turn-over"));
+  end();
+  start();  // what was being scanned when the station went down waits for a person
+  ASSERT_TRUE(becomes("turn-over"));
+  ask("press");
+  ASSERT_TRUE(becomes("result"));
+  EXPECT_EQ(views_of(2), 8U);
+  end();
+}
+
+TEST_F(Daemon, AnEmergencyStopIsLatchedAndTheScanGoesOnAfterwards) {
+  configure();
+  start();
+  ASSERT_TRUE(becomes("ready"));
+  ask("press");
+  ASSERT_TRUE(becomes("turn-over"));
+  ask("press-stop");
+  ASSERT_TRUE(becomes("fault"));
+  EXPECT_EQ(signal(), "fault");
+  ask("press");
+  EXPECT_TRUE(skullstation::testing::comes_true([&] {
+    return message().find("can't be reset: emergency stop pressed") != std::string::npos;
+  }));
+  ASSERT_TRUE(becomes("fault"));
+  ask("release-stop");
+  EXPECT_EQ(state(), "fault") << "latched";
+  ask("press");
+  ASSERT_TRUE(becomes("turn-over"));
+  ask("press");
+  ASSERT_TRUE(becomes("result"));
+  EXPECT_EQ(views_of(1), 8U);
+  EXPECT_EQ(cases().size(), 1U);
+  end();
+}
+
+TEST_F(Daemon, ACaseThatFailsLeavesTheStationReady) {
+  configure();
+  start();
+  ASSERT_TRUE(becomes("ready"));
+  std::ofstream(storage() / "fail-steps") << "x";
+  ask("press");
+  ASSERT_TRUE(becomes("turn-over"));
+  ask("press");
+  ASSERT_TRUE(becomes("result"));
+  EXPECT_EQ(signal(), "attention");
+  EXPECT_EQ(cases()[0]["state"], "failed");
+  const json failed = job(1, "reconstruct");
+  EXPECT_THAT(failed["error"].get<std::string>(), HasSubstr("made of cheese"));
+  fs::remove(storage() / "fail-steps");
+  EXPECT_EQ(ask(fmt::format("retry {}", failed["id"].get<int>()))["ok"], true);
+  EXPECT_TRUE(skullstation::testing::comes_true([&] { return cases()[0]["state"] == "done"; }));
+  end();
+}
+
+TEST_F(Daemon, AnUnpluggedCameraIsToldOfBeforeTheNextScan) {
+  configure("unplugged_after_frames = 1\n", "camera_check_s = 1\n");
+  start();
+  ASSERT_TRUE(becomes("fault"));
+  EXPECT_THAT(message(), HasSubstr("camera \"cam0\""));
+  EXPECT_THAT(message(), HasSubstr("is unplugged"));
+  end();
+}
+
+TEST_F(Daemon, SurvivesKillsDuringAScan) {
+  configure();
+  const char* wish = std::getenv("SKULLSTATION_LONG");
+  const int kills = wish != nullptr && std::string(wish) == "1" ? 40 : 4;
+  Random random(20260131);
+  for (int kill = 0; kill < kills; ++kill) {
+    start();
+    ASSERT_TRUE(skullstation::testing::comes_true(
+        [&] {
+          const std::string now = state();
+          return now == "ready" || now == "turn-over" || now == "building" || now == "result";
+        },
+        300s));
+    ask("press");
+    std::this_thread::sleep_for(std::chrono::milliseconds(random.below(400)));
+    daemon_->send(SIGKILL);
+    daemon_->wait();
+  }
+  start();
+  // Whatever was under way is finished at the button.
+  ASSERT_TRUE(skullstation::testing::comes_true(
+      [&] {
+        const std::string now = state();
+        if (now == "turn-over") ask("go");  // at once, and nothing in any other state but ready
+        if (now != "ready" && now != "result") return false;
+        for (const json& row : cases()) {
+          if (row["state"] == "building" || row["state"] == "scanning") return false;
+        }
+        return true;
+      },
+      300s));
+  for (const json& row : cases()) {
+    EXPECT_TRUE(row["state"] == "done" || row["state"] == "cancelled") << row.dump();
+    if (row["state"] == "done") {
+      EXPECT_EQ(views_of(row["id"]), 8U);
+    }
+  }
+  end();
+  const SystemClock clock;
+  const auto store = CaseStore::open(storage(), clock, "test");
+  ASSERT_TRUE(store) << store.error().message();
+  EXPECT_THAT((*store)->damage(true), ::testing::IsEmpty());
+}
+
+TEST_F(Daemon, TellsSystemdThatItIsReadyAndAlive) {
+  configure();
+  const fs::path notify = folder_ / "notify";
+  const int socket = ::socket(AF_UNIX, SOCK_DGRAM, 0);
+  const sockaddr_un address = address_of(notify);
+  ASSERT_EQ(::bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  auto words = command();
+  words.insert(words.begin(), {"/usr/bin/env", "NOTIFY_SOCKET=" + notify.string()});
+  daemon_ = std::make_unique<Process>(words);
+  std::string told;
+  while (told.find("WATCHDOG=1") == std::string::npos) {
+    char text[256] = {};
+    ASSERT_GT(::recv(socket, text, sizeof text - 1, 0), 0);
+    told += std::string(text) + "\n";
+  }
+  EXPECT_THAT(told, HasSubstr("READY=1"));
+  ::close(socket);
+  end();
+}
+
+TEST_F(Daemon, WhatIsWrongWithItsCallIsSaid) {
+  const auto bin = skullstation::testing::skullstation_program().parent_path();
+  const auto nothing = Process({(bin / "skullstationd").string()}).wait();
+  EXPECT_EQ(nothing.exit_code, 2);
+  EXPECT_THAT(nothing.err, HasSubstr("name one with --config, or try it with --simulate"));
+  configure();
+  start();
+  ASSERT_TRUE(becomes("ready"));
+  const auto second = Process(command()).wait();
+  EXPECT_EQ(second.exit_code, 3);
+  EXPECT_THAT(second.err, HasSubstr("is used by another skullstationd"));
+  EXPECT_THAT(ask("dance").value("error", ""), HasSubstr("unknown word \"dance\""));
+  EXPECT_THAT(ask("retry 7").value("error", ""), HasSubstr("there is no such job"));
+  end();
+}
+
+}  // namespace
+}  // namespace skullstation
