@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <string_view>
 
 #include "core/file.h"
 #include "tests/support/process.h"
@@ -18,6 +19,10 @@ using testing::TemporaryFolder;
 
 /// The command that makes the default model, on a few people who were coarsely scanned.
 TEST(MakeDefaultModel, GoesFromPeopleToAModelThatApproximates) {
+  const char* wanted = std::getenv("SKULLSTATION_LONG");
+  if (wanted == nullptr || std::string_view(wanted) != "1") {
+    GTEST_SKIP() << "takes two minutes: ./run-tests --long";
+  }
   const TemporaryFolder folder;
   const std::string model = (folder / "model.h5").string();
   ASSERT_EQ(::setenv("SKULLSTATION", testing::skullstation_program().c_str(), 1), 0);
