@@ -34,7 +34,7 @@ struct AuditEntry {
 };
 
 /// The most bytes that an entry's line may have.
-constexpr std::size_t max_audit_line = 64 * 1024;
+constexpr std::size_t max_audit_line = std::size_t{64} * 1024;
 
 /// The entry as a line of JSON without a line feed, its last member the Ed25519 signature of the
 /// line before `,"signature":`. Fails for text that is no UTF-8, and for a line that is too long.

@@ -131,7 +131,7 @@ Result<std::string> append_audit_entry(const AuditLogPlace& log, const AuditEven
     entry.details = nlohmann::ordered_json{{"format", "skullstation-audit/1"},
                                            {"public_key", keys.ed25519_public_pem}}
                         .dump();
-    const auto first = next_line(*end, entry, keys);
+    auto first = next_line(*end, entry, keys);
     if (!first) return first;
     bytes += *first + "\n";
   }

@@ -11,7 +11,7 @@
 namespace skullstation {
 
 /// Bytes of a block. A file's last one may be shorter.
-constexpr std::uint64_t block_bytes = 256 * 1024;
+constexpr std::uint64_t block_bytes = std::uint64_t{256} * 1024;
 
 /// What a file was: enough to tell which part of it has changed.
 struct FileDigest {
