@@ -48,7 +48,7 @@ inline std::string collected(const BioHandle& bio) {
 /// OpenSSL's own words for what failed last; empties its list of errors.
 inline std::string openssl_reason() {
   const char* reason = ERR_reason_error_string(ERR_peek_last_error());
-  const std::string text = reason != nullptr ? reason : "no reason given";
+  std::string text = reason != nullptr ? reason : "no reason given";
   ERR_clear_error();
   return text;
 }

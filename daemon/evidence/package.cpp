@@ -21,12 +21,12 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Tag files and signatures are small; this is for them and the folders.
-constexpr std::uint64_t spare_bytes = 16 * 1024 * 1024;
+constexpr std::uint64_t spare_bytes = std::uint64_t{16} * 1024 * 1024;
 
 using SealedFiles = std::map<std::string, FileDigest>;
 
 Result<void> check_place(const PackageSource& source, const fs::path& out) {
-  if (const auto free = check_new_folder(out); !free) return free;
+  if (const auto free = check_new_folder(out); !free) return forward(free);
   const auto whole = [](const fs::path& path) {
     std::error_code ignored;
     const fs::path resolved = fs::weakly_canonical(fs::absolute(path), ignored);

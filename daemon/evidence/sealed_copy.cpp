@@ -24,7 +24,7 @@ namespace {
 /// Read, hashed and written at a time: whole blocks.
 constexpr std::size_t chunk_bytes = 16 * block_bytes;
 /// Below it, threads cost more than they save.
-constexpr std::uint64_t parallel_from_bytes = 1024 * 1024;
+constexpr std::uint64_t parallel_from_bytes = std::uint64_t{1024} * 1024;
 
 /// A piece of a file. Its buffer is not cleared first: a small file would pay for a large one's.
 struct Chunk {

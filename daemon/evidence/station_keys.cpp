@@ -129,7 +129,7 @@ Result<void> create_station_keys(const fs::path& folder, const NewStationKeys& w
   if (wanted.station.empty()) {
     return fail(ErrorKind::usage, "--station", "is empty; the keys' certificate needs a name");
   }
-  if (const auto free = check_new_folder(folder); !free) return free;
+  if (const auto free = check_new_folder(folder); !free) return forward(free);
   const KeyHandle ed25519 = generate_ed25519();
   const KeyHandle p256 = generate_p256();
   const std::string certificate = self_signed(p256.get(), wanted, clock.utc_now());
@@ -140,7 +140,7 @@ Result<void> create_station_keys(const fs::path& folder, const NewStationKeys& w
                 "it may have 64 characters");
   }
   StagedFolder staged(folder);
-  if (const auto made = staged.make(); !made) return made;
+  if (const auto made = staged.make(); !made) return forward(made);
   ::chmod(staged.path().c_str(), 0700);
   for (const auto& written :
        {write_private(staged / ed25519_key_file, private_pem(ed25519)),

@@ -55,6 +55,7 @@ std::vector<Job> current_jobs(const std::vector<Job>& jobs) {
     }
   }
   std::vector<Job> current;
+  current.reserve(last.size());
   for (const auto& [step, job] : last) current.push_back(job);
   std::ranges::sort(current, {}, &Job::id);
   return current;

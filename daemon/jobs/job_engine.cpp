@@ -19,8 +19,8 @@ using std::chrono::steady_clock;
 
 namespace {
 
-constexpr std::size_t longest_log = 16 * 1024;
-constexpr std::size_t longest_figures = 1024 * 1024;
+constexpr std::size_t longest_log = std::size_t{16} * 1024;
+constexpr std::size_t longest_figures = std::size_t{1024} * 1024;
 constexpr int past_runs = 20;
 
 /// The end of a file; empty if there is none.
@@ -151,7 +151,7 @@ Result<void> JobEngine::check_space(const Job& job) const {
   const auto free = free_space_bytes(store_.folder());
   if (!free) return forward(free);
   if (kind == nullptr || *free >= kind->space_bytes) return {};
-  constexpr std::uint64_t mib = 1024 * 1024;
+  constexpr std::uint64_t mib = std::uint64_t{1024} * 1024;
   return fail(ErrorKind::bad_input, store_.folder().string(),
               fmt::format("the step {} of case {} waits: it may need {} MiB, {} are free", job.step,
                           job.case_id, kind->space_bytes / mib, *free / mib),

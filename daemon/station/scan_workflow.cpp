@@ -100,7 +100,7 @@ Result<ScanReport> photograph_specimen(const StationConfig& config, Station& sta
     note_truths(*station.room, options.plan, session, scan);
     station.room->place_specimen(0);
     scan.ask_for_placement = [&](const PlacementRequest& request, std::stop_token stop) {
-      const auto confirmed = ask(request, std::move(stop));
+      auto confirmed = ask(request, std::move(stop));
       if (confirmed) station.room->place_specimen(request.pass);
       return confirmed;
     };
