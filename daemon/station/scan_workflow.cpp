@@ -58,7 +58,7 @@ void note_truths(SimulatedRoom& room, const ScanPlan& plan, const std::filesyste
 
 }  // namespace
 
-Result<void> wait_for_confirmation(StationHardware& hardware, std::stop_token stop) {
+Result<void> wait_for_confirmation(StationHardware& hardware, const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const auto press = hardware.button->wait_for_press(1s, stop);
     if (!press) return forward(press);
@@ -115,10 +115,10 @@ Result<ScanReport> scan_specimen(const StationConfig& config, Station& station,
   StationHardware& hardware = station.hardware;
   AskForPlacement ask = [](const PlacementRequest&, std::stop_token) -> Result<void> { return {}; };
   if (!station.room) {
-    ask = [&](const PlacementRequest& request, std::stop_token stop) -> Result<void> {
+    ask = [&](const PlacementRequest& request, const std::stop_token& stop) -> Result<void> {
       prompts.tell(placement_prompt(request));
       if (auto shown = hardware.lamp->show(Signal::attention); !shown) return shown;
-      if (auto confirmed = wait_for_confirmation(hardware, std::move(stop)); !confirmed) {
+      if (auto confirmed = wait_for_confirmation(hardware, stop); !confirmed) {
         return confirmed;
       }
       return hardware.lamp->show(Signal::working);

@@ -45,6 +45,6 @@ std::string placement_prompt(const PlacementRequest& request);
 std::uint64_t scan_space_bytes(const StationConfig& config);
 
 /// Waits until the operator has confirmed at the button: brief press goes on, held press cancels.
-Result<void> wait_for_confirmation(StationHardware& hardware, std::stop_token stop);
+Result<void> wait_for_confirmation(StationHardware& hardware, const std::stop_token& stop);
 
 }  // namespace skullstation
