@@ -113,7 +113,9 @@ Result<ScanReport> scan_specimen(const StationConfig& config, Station& station,
                                  const std::filesystem::path& session,
                                  const OperatorPrompts& prompts, const Progress& progress) {
   StationHardware& hardware = station.hardware;
-  AskForPlacement ask = [](const PlacementRequest&, std::stop_token) -> Result<void> { return {}; };
+  AskForPlacement ask = [](const PlacementRequest&, const std::stop_token&) -> Result<void> {
+    return {};
+  };
   if (!station.room) {
     ask = [&](const PlacementRequest& request, const std::stop_token& stop) -> Result<void> {
       prompts.tell(placement_prompt(request));
