@@ -12,6 +12,7 @@
 #include "capture/calibration/board_pose.h"
 #include "core/adjustment/bundle_solver.h"
 #include "core/adjustment/reprojection.h"
+#include "core/median.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -108,12 +109,6 @@ double search_focal_length(std::vector<ActiveView>& views, const CharucoBoard& b
   cost_of(best_focal, poses);
   for (std::size_t i = 0; i < views.size(); ++i) views[i].camera_from_board = poses[i];
   return best_focal;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// The first, crude lens may have chosen the wrong one of the two poses that a plane allows: looks

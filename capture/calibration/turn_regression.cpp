@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -14,12 +15,6 @@ struct Line {
   double offset = 0.0;
   double slope_error = 0.0;
 };
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Line weighted_line(const std::vector<double>& x, const std::vector<double>& y,
                    const std::vector<double>& weights) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/file.h"
+#include "core/median.h"
 #include "daemon/jobs/step_process.h"
 
 namespace skullstation {
@@ -72,12 +73,6 @@ std::string flaw_of_artifact(const fs::path& folder, const StepKind& kind) {
     }
   }
   return {};
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 }  // namespace

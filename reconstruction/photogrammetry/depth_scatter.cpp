@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/median.h"
 #include "core/parallel.h"
 #include "core/units.h"
 
@@ -55,10 +56,8 @@ std::vector<float> depth_scatter(const TriangleMesh& mesh, std::span<const Depth
         if (distance && std::abs(*distance) <= reach_mm) distances.push_back(std::abs(*distance));
       }
       if (distances.size() < 2) continue;
-      const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-      std::nth_element(distances.begin(), middle, distances.end());
       scatter[static_cast<std::size_t>(v)] =
-          static_cast<float>(kErrorPerScatter * kSdPerMedian * *middle);
+          static_cast<float>(kErrorPerScatter * kSdPerMedian * median(distances));
     }
   });
   return scatter;

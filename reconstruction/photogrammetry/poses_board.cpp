@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
 #include "core/parallel.h"
 #include "core/units.h"
 #include "reconstruction/photogrammetry/bundle_adjustment.h"
@@ -21,13 +22,6 @@ constexpr const char* subject = "poses from the board";
 
 /// A Rayleigh distribution's median over the standard deviation of one coordinate.
 constexpr double rayleigh_median = 1.1774;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The views still in use, as the bundle holds them, and where they came from.
 struct Work {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 
+#include "core/median.h"
 #include "core/parallel.h"
 #include "core/units.h"
 #include "reconstruction/photogrammetry/bundle_adjustment.h"
@@ -24,13 +25,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* subject = "structure from motion";
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// A folder of its own that goes with the scope.
 class ScratchFolder {

@@ -6,16 +6,11 @@
 #include <cmath>
 
 #include "core/linear_algebra.h"
+#include "core/median.h"
 
 namespace skullstation {
 
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The rotation that lies nearest to all others in total.
 Eigen::Quaterniond medoid(const std::vector<Eigen::Quaterniond>& rotations) {

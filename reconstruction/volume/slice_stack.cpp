@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/median.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -20,12 +21,6 @@ double rounding_mm(double gap_mm) { return std::max(0.02, 0.02 * gap_mm); }
 
 tl::unexpected<Error> bad(const std::string& where, std::string what, std::string advice = {}) {
   return fail(ErrorKind::bad_input, where, std::move(what), std::move(advice));
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Why a gap of this size among others of `usual_mm` means missing slices, or 0: how many.
