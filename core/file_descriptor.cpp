@@ -17,8 +17,9 @@ std::string reason(int error_number) { return std::system_category().message(err
 
 }  // namespace
 
-FileDescriptor::~FileDescriptor() {
+void FileDescriptor::close() {
   if (fd_ >= 0) ::close(fd_);
+  fd_ = -1;
 }
 
 int write_all(const FileDescriptor& file, std::string_view bytes) {

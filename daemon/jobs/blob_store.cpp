@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/file.h"
+#include "core/file_descriptor.h"
 
 namespace skullstation {
 
@@ -29,12 +30,11 @@ tl::unexpected<Error> failed(const fs::path& path, const char* what, int error_n
 
 /// On the disk, and nobody writes to it any more.
 Result<void> seal(const fs::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
-  if (descriptor < 0) return failed(file, "can't be opened", errno);
-  int failure = ::fchmod(descriptor, 0444) == 0 ? 0 : errno;
-  if (failure == 0 && ::fsync(descriptor) != 0) failure = errno;
-  ::close(descriptor);
-  if (failure != 0) return failed(file, "can't be made safe", failure);
+  const FileDescriptor opened(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+  if (opened.get() < 0) return failed(file, "can't be opened", errno);
+  if (::fchmod(opened.get(), 0444) != 0 || ::fsync(opened.get()) != 0) {
+    return failed(file, "can't be made safe", errno);
+  }
   return {};
 }
 

@@ -17,13 +17,14 @@
 
 #include <array>
 #include <cerrno>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <mutex>
 #include <optional>
 #include <system_error>
+
+#include "core/clock.h"
+#include "core/file_descriptor.h"
 
 namespace skullstation {
 
@@ -130,31 +131,9 @@ std::vector<char*> pointers(std::vector<std::string>& words) {
   ::_exit(127);
 }
 
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor() { close(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  void close() {
-    if (fd_ >= 0) ::close(fd_);
-    fd_ = -1;
-  }
-
- private:
-  int fd_;
-};
-
 tl::unexpected<Error> cannot(const std::string& what) {
   return fail(ErrorKind::bad_input, what,
               fmt::format("can't be used ({})", std::system_category().message(errno)));
-}
-
-void sleep_for(std::chrono::milliseconds time, const std::stop_token& stop) {
-  std::mutex mutex;
-  std::unique_lock lock(mutex);
-  std::condition_variable_any().wait_for(lock, stop, time, [] { return false; });
 }
 
 /// Waits until no process of an earlier step has the lock any more.
@@ -165,7 +144,7 @@ Result<void> take_lock(int descriptor, const std::filesystem::path& file,
     if (stop.stop_requested()) {
       return fail(ErrorKind::cancelled, file.string(), "stopped while an older step still ran");
     }
-    sleep_for(50ms, stop);
+    SystemClock().sleep_for(50ms, stop);
   }
   return {};
 }
@@ -220,7 +199,7 @@ StepEnd follow(pid_t child, int output, const StepProcess& process, const std::s
       pollfd waiting{output, POLLIN, 0};
       if (::poll(&waiting, 1, 50) > 0) talking = lines.read();
     } else {
-      sleep_for(10ms, {});
+      SystemClock().sleep_for(10ms, {});
     }
     // It stays a zombie for now, so that its number can't be another's when its group is ended.
     ended.si_pid = 0;
@@ -263,16 +242,17 @@ Result<StepEnd> run_step_process(const StepProcess& process, const std::stop_tok
   prepared.limits = process.limits;
   if (::access(prepared.argv[0], X_OK) != 0) return cannot(process.command.front());
 
-  Descriptor lock(::open(process.lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
+  FileDescriptor lock(::open(process.lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
   if (lock.get() < 0) return cannot(process.lock.string());
   if (auto taken = take_lock(lock.get(), process.lock, stop); !taken) return forward(taken);
-  const Descriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
-  const Descriptor log(::open(process.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+  const FileDescriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  const FileDescriptor log(
+      ::open(process.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
   if (log.get() < 0) return cannot(process.log.string());
   std::array<int, 2> pipe{};
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0) return cannot("a pipe");
-  const Descriptor output(pipe[0]);
-  Descriptor input(pipe[1]);
+  const FileDescriptor output(pipe[0]);
+  FileDescriptor input(pipe[1]);
   ::fcntl(output.get(), F_SETFL, O_NONBLOCK);
   prepared.lock = lock.get();
   prepared.output = input.get();
