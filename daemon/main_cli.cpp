@@ -407,9 +407,7 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
   app.add_option("--seed", common.seed, "of everything random")->capture_default_str();
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   const StopOnSignal stop;
 
   CLI::App app{"Skullstation: from a skull on a turntable to a facial approximation"};
@@ -434,4 +432,10 @@ int main(int argc, char** argv) {
     result = chosen(common, bar.progress(stop.token()));
   }
   return finish(result, common.json);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return skullstation::guarded("skullstation", [&] { return run_program(argc, argv); });
 }

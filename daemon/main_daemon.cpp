@@ -78,9 +78,7 @@ Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
   return {};
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   const StopOnSignal stop;  // before any other thread
   CLI::App app{"skullstationd: a station at work, with its button, its lamps and its jobs"};
   app.set_version_flag("--version", SKULLSTATION_VERSION);
@@ -106,4 +104,10 @@ int main(int argc, char** argv) {
   if (served) return 0;
   fmt::print(stderr, "skullstationd: {}\n", served.error().message());
   return exit_code(served.error().kind);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return skullstation::guarded("skullstationd", [&] { return run_program(argc, argv); });
 }

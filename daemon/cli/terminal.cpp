@@ -8,6 +8,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <exception>
 #include <nlohmann/json.hpp>
 
 namespace skullstation {
@@ -101,6 +102,18 @@ int finish(const Result<CommandReport>& result, bool json) {
     fmt::print("{}\n", object.dump(2));
   }
   return exit_code(error.kind);
+}
+
+int guarded(const char* program, const std::function<int()>& body) noexcept {
+  try {
+    return body();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: ended by a mistake of its own or a lack of memory (%s)\n", program,
+                 error.what());
+  } catch (...) {
+    std::fprintf(stderr, "%s: ended by a mistake of its own\n", program);
+  }
+  return 5;
 }
 
 }  // namespace skullstation

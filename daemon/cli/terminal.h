@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <stop_token>
@@ -66,5 +67,8 @@ std::string printable(std::string text);
 /// Prints the report (stdout) or the error (stderr; with `json` an object on stdout too) and
 /// returns the process's exit code.
 int finish(const Result<CommandReport>& result, bool json);
+
+/// Runs a program and returns its exit code: an exception that nobody expected is a message and 5.
+int guarded(const char* program, const std::function<int()>& body) noexcept;
 
 }  // namespace skullstation
