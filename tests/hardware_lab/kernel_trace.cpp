@@ -15,14 +15,17 @@ const std::filesystem::path tracing = "/sys/kernel/tracing";
 
 }  // namespace
 
-KernelTrace::KernelTrace(const std::string& event)
-    : enable_((tracing / "events" / event / "enable").string()) {
+KernelTrace::KernelTrace(const std::string& event) {
   write_kernel_file(tracing / "trace_clock", "mono");  // empties the record, too
   write_kernel_file(tracing / "buffer_size_kb", "8192");
-  write_kernel_file(enable_, "1");
+  // An event stays enabled for good: enabling changes the kernel's code, which the emulator that
+  // the lab runs in does not always survive.
+  const auto enable = tracing / "events" / event / "enable";
+  if (read_kernel_file(enable) != "1") write_kernel_file(enable, "1");
+  write_kernel_file(tracing / "tracing_on", "1");
 }
 
-KernelTrace::~KernelTrace() { write_kernel_file(enable_, "0"); }
+KernelTrace::~KernelTrace() { write_kernel_file(tracing / "tracing_on", "0"); }
 
 void KernelTrace::mark(const std::string& text) {
   write_kernel_file(tracing / "trace_marker", text);

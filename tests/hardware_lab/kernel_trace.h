@@ -31,9 +31,6 @@ class KernelTrace {
 
   /// All so far, in order of time. Throws std::runtime_error if the kernel had to drop any.
   std::vector<TraceEvent> events() const;
-
- private:
-  std::string enable_;
 };
 
 /// A GPIO line as it was driven by software.
