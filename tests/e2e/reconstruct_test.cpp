@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using skullstation::testing::ProcessResult;
 using skullstation::testing::skullstation_cli;
+using skullstation::testing::SmallStation;
 using skullstation::testing::TemporaryFolder;
 using skullstation::testing::write_small_station;
 using ::testing::HasSubstr;
@@ -29,7 +30,10 @@ class Reconstruct : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     scanned_ = std::make_unique<TemporaryFolder>();
-    const auto config = write_small_station(scanned_->path(), {.views_per_ring = 12, .passes = 1});
+    SmallStation station;
+    station.views_per_ring = 12;
+    station.passes = 1;
+    const auto config = write_small_station(scanned_->path(), station);
     const auto scan = skullstation_cli(
         {"scan", "--config", config.string(), "--out", (*scanned_ / "session").string()});
     ASSERT_EQ(scan.exit_code, 0) << scan.err;

@@ -30,7 +30,9 @@ TEST(MultiPieLandmarks, NamesThoseThatOurTemplateHas) {
         source->model.head_template.landmarks,
         [&](const TemplateLandmark& ours) { return ours.name == landmark.name; }))
         << landmark.name;
-    if (landmark.name == "exocanthion right") EXPECT_EQ(landmark.vertex, 136);
+    if (landmark.name == "exocanthion right") {
+      EXPECT_EQ(landmark.vertex, 136);
+    }
   }
 }
 

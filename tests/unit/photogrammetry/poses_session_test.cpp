@@ -128,8 +128,13 @@ TEST_F(SessionPoses, APassOfTwoViewsIsTooLittleForMotion) {
 class Photographs : public ::testing::Test {
  protected:
   Photographs() {
-    session_.cameras = {{.id = "cam0", .width = 32, .height = 24}};
-    session_.views = {{.image = "a.png", .camera = "cam0"}};
+    session_.cameras.resize(1);
+    session_.cameras[0].id = "cam0";
+    session_.cameras[0].width = 32;
+    session_.cameras[0].height = 24;
+    session_.views.resize(1);
+    session_.views[0].image = "a.png";
+    session_.views[0].camera = "cam0";
   }
   void write(const Image8& image) {
     ASSERT_TRUE(write_file_durably(folder_ / "a.png", encode_png(image)));
