@@ -272,6 +272,7 @@ void add_commands(CLI::App& app, Command& chosen) {
             .add_option("--mandible-opening", o.mandible_opening_deg,
                         "turn of the mandible, in degrees; the lips stay closed")
             ->check(CLI::Range(0.0, 8.0));
+        phantom.add_flag("--tooth-loss", o.tooth_loss, "let people miss teeth as their age has it");
         phantom.add_flag("--ct", o.ct, "write the CT volume, too (ct.nii.gz)");
         phantom.add_flag("--dicom", o.dicom, "write the CT as a DICOM series (folder ct)");
         phantom.add_option("--spacing", o.spacing_mm, "of the CT's voxels: X Y Z, in mm")

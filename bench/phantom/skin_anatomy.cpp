@@ -1,8 +1,8 @@
-// How deep the canonical skin lies over the skull beside the tissue depth table; how far it lies
-// from a real head; how long the CT of the canonical head takes, and how well its isosurfaces, and
-// what CT import makes of it, meet the exact surfaces.
+// How deep the canonical skin lies over the skull beside the tissue depth table; and either how far
+// it and its landmarks lie from a real head's, or how long the CT of the canonical head takes, and
+// how well its isosurfaces, and what CT import makes of it, meet the exact surfaces.
 //
-//   bench_skin_anatomy [--real SKIN.ply]     a real head's skin (skullstation ct import)
+//   bench_skin_anatomy [--real SKIN.ply]     the real head's skin (ct import ct-head.nii.gz)
 
 #include <fmt/core.h>
 
@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "reconstruction/distance/comparison.h"
@@ -44,6 +45,40 @@ void print_depths(const TriangleMesh& skin) {
   }
 }
 
+/// Read off orthographic pictures of the real head's skin (patient frame of the scan) with a grid
+/// of 10 mm; to about 2 mm. What metal streaks or flatness blur (mouth, vertex, opisthocranion) is
+/// left out.
+struct Picked {
+  std::string_view name;
+  double position_mm[3];
+};
+
+constexpr Picked kPicked[] = {
+    {"pronasale", {106.5, 8.1, 108.6}},          {"subnasale", {106.0, 25.4, 92.9}},
+    {"nasion skin", {107.0, 39.5, 143.5}},       {"glabella skin", {106.4, 47.0, 163.5}},
+    {"alare left", {124.4, 28.5, 100.0}},        {"alare right", {92.3, 28.5, 100.0}},
+    {"endocanthion left", {127.4, 52.8, 133.1}}, {"exocanthion left", {148.0, 60.5, 132.6}},
+    {"exocanthion right", {66.4, 58.7, 135.4}},  {"superaurale left", {188.5, 150.0, 118.0}},
+    {"superaurale right", {17.5, 150.0, 123.3}}, {"subaurale left", {183.0, 137.2, 65.8}},
+    {"subaurale right", {32.0, 132.2, 65.8}},    {"tragion left", {180.4, 132.8, 97.0}},
+    {"tragion right", {28.6, 127.8, 99.5}},      {"pogonion skin", {106.4, 29.8, 41.5}},
+    {"menton skin", {106.4, 38.6, 21.5}},
+};
+
+void print_landmarks(const Similarity3& real_from_canonical) {
+  const std::vector<Landmark> landmarks = canonical_skin_landmarks();
+  double sum_mm = 0.0;
+  for (const Picked& picked : kPicked) {
+    const Vector3d real(picked.position_mm);
+    const double off_mm =
+        (real_from_canonical * at(landmarks, std::string(picked.name)) - real).norm();
+    fmt::print("{:24} {:.1f} mm\n", picked.name, off_mm);
+    sum_mm += off_mm;
+  }
+  fmt::print("{} landmarks: mean {:.2f} mm (at most 4)\n", std::size(kPicked),
+             sum_mm / std::size(kPicked));
+}
+
 int print_real(const TriangleMesh& skin, const char* path) {
   const auto real = read_mesh(path);
   if (!real) {
@@ -66,6 +101,7 @@ int print_real(const TriangleMesh& skin, const char* path) {
   const DistanceStatistics& d = comparison->a_to_b;
   fmt::print("\nfrom the real head: mean {:.2f}, median {:.2f}, P95 {:.2f} mm (scale {:.3f})\n",
              d.mean_mm, d.median_mm, d.p95_mm, comparison->b_from_a.scale);
+  print_landmarks(comparison->b_from_a);
   return 0;
 }
 
@@ -143,7 +179,7 @@ int run(int argc, char** argv) {
   const TriangleMesh skin = canonical_skin(1.5, 0);
   print_depths(skin);
   if (argc == 3 && std::strcmp(argv[1], "--real") == 0) {
-    if (const int code = print_real(skin, argv[2]); code != 0) return code;
+    return print_real(skin, argv[2]);
   }
   PhantomBody body;
   body.bone = canonical_skull(1.0, 0);

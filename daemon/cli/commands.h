@@ -102,6 +102,7 @@ struct PhantomCommand {
   std::filesystem::path out;
   double edge_mm = 1.5;
   double mandible_opening_deg = 0.0;
+  bool tooth_loss = false;          ///< teeth missing as their age has it
   bool ct = false;                  ///< write the CT volume, too
   bool dicom = false;               ///< as a DICOM series instead of NIfTI
   std::vector<double> spacing_mm;   ///< of its voxels, three; empty: 0.5, 0.5, 1

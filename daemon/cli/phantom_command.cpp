@@ -9,6 +9,7 @@
 #include "reconstruction/phantom/person_ct.h"
 #include "reconstruction/phantom/person_files.h"
 #include "reconstruction/phantom/specimen.h"
+#include "reconstruction/phantom/tooth_loss.h"
 #include "reconstruction/volume/dicom_writer.h"
 #include "reconstruction/volume/image_file.h"
 
@@ -18,6 +19,7 @@ namespace {
 
 constexpr std::uint64_t kNoise = 0xc7;
 constexpr std::uint64_t kStain = 0x5d;
+constexpr std::uint64_t kTeeth = 0x7e;
 
 Result<void> write_ct(const PhantomCommand& command, const CommonOptions& common,
                       const Person& person, const TissueMap& tissue,
@@ -61,6 +63,10 @@ Result<CommandReport> run(const PhantomCommand& command, const CommonOptions& co
     progress.report(static_cast<double>(i) / command.count, fmt::format("person {}", i + 1));
     PersonParameters parameters = draw_person(mix(common.seed, static_cast<std::uint64_t>(i)));
     parameters.mandible_opening_deg = command.mandible_opening_deg;
+    if (command.tooth_loss) {
+      parameters.missing_teeth =
+          draw_missing_teeth(parameters.age_years, mix(parameters.seed, kTeeth));
+    }
     const Person person = maker.make(parameters, common.threads);
     const auto folder = command.out / fmt::format("person_{:04}", i + 1);
     if (auto written = write_person(person, folder); !written) return forward(written);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <map>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -61,9 +62,15 @@ int tooth_position(std::string_view part) {
   return 0;
 }
 
+/// FDI's first digit.
+int quadrant(bool upper, bool left) {
+  if (upper) return left ? 2 : 1;
+  return left ? 3 : 4;
+}
+
 Sculpture sculpt(std::span<const StrokeRow> rows, const SkullShape& shape) {
-  const auto missing = [&](int quadrant, int position) {
-    return std::ranges::count(shape.missing_teeth, 10 * quadrant + position) > 0;
+  const auto missing = [&](bool upper, bool left, int position) {
+    return std::ranges::count(shape.missing_teeth, 10 * quadrant(upper, left) + position) > 0;
   };
   std::vector<Stroke> strokes;
   for (const StrokeRow& row : rows) {
@@ -73,8 +80,8 @@ Sculpture sculpt(std::span<const StrokeRow> rows, const SkullShape& shape) {
     }
     if (const int position = tooth_position(row.part); position > 0) {
       const bool upper = row.part.starts_with("upper");
-      const bool left_missing = missing(upper ? 2 : 3, position);
-      const bool right_missing = missing(upper ? 1 : 4, position);
+      const bool left_missing = missing(upper, true, position);
+      const bool right_missing = missing(upper, false, position);
       if (left_missing && right_missing) continue;
       if (left_missing || right_missing) stroke = one_of_pair(stroke, right_missing);
     }
@@ -140,6 +147,28 @@ class ApartSolid final : public ImplicitSolid {
 };
 
 }  // namespace
+
+std::vector<Tooth> canonical_teeth() {
+  std::map<int, Tooth> teeth;
+  for (const auto& rows : {cranium_strokes(), mandible_strokes()}) {
+    for (const StrokeRow& row : rows) {
+      const int position = tooth_position(row.part);
+      if (position == 0) continue;
+      const bool upper = row.part.starts_with("upper");
+      for (const bool left : {true, false}) {
+        const int fdi = 10 * quadrant(upper, left) + position;
+        Tooth& tooth = teeth[fdi];
+        tooth.fdi = fdi;
+        tooth.upper = upper;
+        (row.part.ends_with("root") ? tooth.root_mm : tooth.crown_mm) =
+            one_of_pair(stroke_of(row), left).center_mm;
+      }
+    }
+  }
+  std::vector<Tooth> found;
+  for (const auto& [fdi, tooth] : teeth) found.push_back(tooth);
+  return found;
+}
 
 Rigid3 mandible_opening(double opening_deg) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(radians(opening_deg), Eigen::Vector3d::UnitX()));

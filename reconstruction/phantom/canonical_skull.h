@@ -22,6 +22,17 @@ struct SkullShape {
   std::vector<int> missing_teeth;
 };
 
+/// A tooth of the canonical skull, as its two strokes lie.
+struct Tooth {
+  int fdi = 0;  ///< two-digit notation
+  bool upper = false;
+  Eigen::Vector3d crown_mm;  ///< the crown's centre, in the anatomical frame, the jaw closed
+  Eigen::Vector3d root_mm;   ///< the root's centre, deep in the bone
+};
+
+/// The 28 teeth.
+std::vector<Tooth> canonical_teeth();
+
 /// The two bones that come apart: the cranium with the upper teeth, the mandible with the lower.
 struct SkullSolids {
   std::unique_ptr<ImplicitSolid> cranium;

@@ -4,6 +4,7 @@
 #include "reconstruction/distance/triangle_bvh.h"
 #include "reconstruction/phantom/canonical_skin.h"
 #include "reconstruction/phantom/canonical_skull.h"
+#include "reconstruction/phantom/tooth_loss.h"
 
 namespace skullstation {
 
@@ -45,9 +46,14 @@ Person PersonMaker::make(const PersonParameters& parameters, int threads) const 
   const SpaceWarp& bone = person.bone.person_from_canonical;
   const SpaceWarp& face = person.face.face_from_canonical;
   const Rigid3& opening = person.bone.open_from_closed;
-  person.skull = moved(skull_, threads, [&](int v, const Eigen::Vector3d& vertex) {
-    return bone(v < cranium_vertices_ ? vertex : opening * vertex);
-  });
+  const std::vector<int>& missing = parameters.missing_teeth;
+  const TriangleMesh healed =
+      missing.empty() ? TriangleMesh{}
+                      : with_healed_sockets(skull_, cranium_vertices_, missing, threads);
+  person.skull =
+      moved(missing.empty() ? skull_ : healed, threads, [&](int v, const Eigen::Vector3d& vertex) {
+        return bone(v < cranium_vertices_ ? vertex : opening * vertex);
+      });
   person.cranium_vertices = cranium_vertices_;
   person.skin =
       moved(skin_, threads, [&](int, const Eigen::Vector3d& vertex) { return bone(face(vertex)); });

@@ -70,6 +70,7 @@ std::string truth_json(const Person& person) {
               {"age_years", parameters.age_years},
               {"bmi", parameters.bmi},
               {"mandible_opening_deg", parameters.mandible_opening_deg},
+              {"missing_teeth", parameters.missing_teeth},
               {"cranium_vertices", person.cranium_vertices},
               {"bone_freedom", parameters.bone_freedom},
               {"tissue_freedom", parameters.tissue_freedom},

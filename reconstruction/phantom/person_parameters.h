@@ -32,6 +32,8 @@ struct PersonParameters {
   std::vector<double> craniometrics_mm;     ///< of craniometric_table()
   std::vector<ThicknessPair> thickness_mm;  ///< of thickness_table()
   FeatureResiduals features;
+  /// In FDI two-digit notation, sockets healed; draw_person leaves all teeth in (tooth_loss.h).
+  std::vector<int> missing_teeth;
   double mandible_opening_deg = 0.0;  ///< in [0, 8]; the lips stay closed
   double bone_freedom = 0.7;    ///< of the skull's shape beyond its measures; 1: the whole prior
   double tissue_freedom = 0.3;  ///< the same of the soft tissue

@@ -8,11 +8,13 @@
 #include <filesystem>
 
 #include "core/file.h"
+#include "core/median.h"
 #include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/phantom/person_ct.h"
 #include "reconstruction/phantom/person_files.h"
 #include "reconstruction/phantom/specimen.h"
 #include "reconstruction/phantom/thickness_table.h"
+#include "reconstruction/phantom/tooth_loss.h"
 
 namespace skullstation {
 namespace {
@@ -128,6 +130,51 @@ TEST(Person, IsTheSameForAnyNumberOfThreads) {
   const Person two = maker().make(draw_person(12), 2);
   EXPECT_EQ(one.skull.vertices, two.skull.vertices);
   EXPECT_EQ(one.skin.vertices, two.skin.vertices);
+}
+
+TEST(ToothLoss, GrowsWithAge) {
+  const auto mean_loss = [](double age_years) {
+    double sum = 0.0;
+    for (std::uint64_t seed = 0; seed < 2000; ++seed) {
+      sum += static_cast<double>(draw_missing_teeth(age_years, seed).size()) / 2000.0;
+    }
+    return sum;
+  };
+  EXPECT_NEAR(mean_loss(42.0), 3.1, 0.5);
+  EXPECT_NEAR(mean_loss(73.0), 9.1, 1.0);
+  EXPECT_EQ(draw_missing_teeth(60.0, 3), draw_missing_teeth(60.0, 3));
+}
+
+TEST(Person, LacksTheTeethThatAreMissingAndCorrespondsStill) {
+  PersonParameters parameters = average_person(Sex::male);
+  const Person whole = maker().make(parameters, 2);
+  parameters.missing_teeth = {11, 36};
+  const Person without = maker().make(parameters, 2);
+  EXPECT_EQ(without.skull.triangles, whole.skull.triangles);
+  EXPECT_EQ(without.skin.vertices, whole.skin.vertices);
+  const auto& landmarks = whole.bone.landmarks;
+  const auto at = [&](const char* name) {
+    return landmarks[landmark_index(landmarks, name)].position_mm;
+  };
+  // The right central incisor hangs below the prosthion, the left first molar stands in the jaw.
+  double farthest_mm = 0.0;
+  std::vector<double> rises_mm;
+  for (Eigen::Index v = 0; v < whole.skull.vertices.rows(); ++v) {
+    const Eigen::Vector3d before = whole.skull.vertices.row(v);
+    const double moved_mm = (without.skull.vertices.row(v).transpose() - before).norm();
+    farthest_mm = std::max(farthest_mm, moved_mm);
+    if (moved_mm < 0.3) continue;
+    const bool incisor = (before - at("prosthion")).norm() < 22.0;
+    const bool molar = (before - at("lateral infradentale left")).norm() < 30.0;
+    EXPECT_TRUE(incisor || molar) << before.transpose();
+    if (v < whole.cranium_vertices && before.z() < at("prosthion").z() - 4.0) {
+      rises_mm.push_back(without.skull.vertices(v, 2) - before.z());
+    }
+  }
+  EXPECT_GT(median(rises_mm), 2.0);
+  EXPECT_GT(std::ranges::min(rises_mm), -1.0) << "along the neighbours' sides";
+  EXPECT_GT(farthest_mm, 4.0);
+  EXPECT_LT(farthest_mm, 16.0);
 }
 
 TEST(Specimen, LacksWhatTheDamageTakes) {
