@@ -14,6 +14,8 @@ namespace {
 
 constexpr float unreached = std::numeric_limits<float>::infinity();
 constexpr int wall_voxels = 3;
+/// What ends within this depth leads to no cavity, such as the furrow behind the ear.
+constexpr double deepest_pocket_mm = 20.0;
 
 /// Calls `work(index, step_mm)` for the 26 neighbours inside the grid.
 template <class Work>
@@ -62,6 +64,28 @@ std::vector<float> depth_below(const VoxelMask& outer, const VoxelMask& solid,
   return depth;
 }
 
+/// Air deeper than `depth_mm` that leads on to where no way was found, through its like.
+VoxelMask leading_inwards(const VoxelMask& solid, const std::vector<float>& depth,
+                          const Eigen::Vector3d& spacing_mm, double depth_mm) {
+  VoxelMask inwards(solid.size);
+  std::vector<std::size_t> front;
+  for (std::size_t v = 0; v < depth.size(); ++v) {
+    if (solid.on[v] != 0 || depth[v] != unreached) continue;
+    inwards.on[v] = 1;
+    front.push_back(v);
+  }
+  while (!front.empty()) {
+    const std::size_t from = front.back();
+    front.pop_back();
+    for_neighbors(solid, from, spacing_mm, [&](std::size_t next, double) {
+      if (solid.on[next] != 0 || inwards.on[next] != 0 || depth[next] <= depth_mm) return;
+      inwards.on[next] = 1;
+      front.push_back(next);
+    });
+  }
+  return inwards;
+}
+
 /// The closing of the body by a ball: what the ball can't reach from outside. Beyond the grid there
 /// is air, but for the side of the feet, where the neck goes on.
 VoxelMask closed_by_ball(const VoxelMask& solid, const Eigen::Vector3d& spacing_mm,
@@ -99,7 +123,9 @@ VoxelMask sealed_from_outside(const VoxelMask& solid, const Eigen::Vector3d& spa
                               const OpeningSealOptions& options, int threads) {
   const VoxelMask outer =
       reachable_from_outside(closed_by_ball(solid, spacing_mm, options.closing_radius_mm, threads));
-  const auto depth = depth_below(outer, solid, spacing_mm, options.depth_mm);
+  const auto depth =
+      depth_below(outer, solid, spacing_mm, std::max(options.depth_mm, deepest_pocket_mm));
+  const VoxelMask inwards = leading_inwards(solid, depth, spacing_mm, options.depth_mm);
 
   VoxelMask sealed(solid.size);
   enum : std::uint8_t { unknown, entered, blocked };
@@ -107,7 +133,7 @@ VoxelMask sealed_from_outside(const VoxelMask& solid, const Eigen::Vector3d& spa
   std::vector<std::size_t> front;
   for (std::size_t v = 0; v < answer.size(); ++v) {
     if (solid.on[v] != 0) continue;
-    answer[v] = depth[v] == unreached ? blocked : entered;
+    answer[v] = inwards.on[v] != 0 ? blocked : entered;
     front.push_back(v);
   }
   for (int round = 0; round < wall_voxels; ++round) {

@@ -97,5 +97,18 @@ TEST(OpeningSeal, ATubeIsClosedBelowItsDepthAndADentIsNot) {
   EXPECT_TRUE(sealed.at(30, 40, 20)) << "deep in the body";
 }
 
+TEST(OpeningSeal, AFurrowStaysOpenToItsGround) {
+  VoxelMask block({60, 50, 40});
+  for_voxels(block, [&](int i, int j, int k) {
+    const bool body = i >= 5 && i < 55 && j >= 10 && j < 45 && k >= 5 && k < 35;
+    const bool furrow = std::abs(i - 20) < 4 && j < 25;
+    const bool canyon = std::abs(i - 40) < 4 && j < 42 && std::abs(k - 20) < 8;
+    block.on[block.index(i, j, k)] = body && !furrow && !canyon ? 1 : 0;
+  });
+  const VoxelMask sealed = sealed_from_outside(block, {1, 1, 1}, {6.0, 6.0}, 2);
+  EXPECT_FALSE(sealed.at(20, 24, 20)) << "the furrow's ground";
+  EXPECT_TRUE(sealed.at(40, 41, 20)) << "the canyon's ground";
+}
+
 }  // namespace
 }  // namespace skullstation
