@@ -70,10 +70,10 @@ void print_landmarks(const Similarity3& real_from_canonical) {
   double sum_mm = 0.0;
   for (const Picked& picked : kPicked) {
     const Vector3d real(picked.position_mm);
-    const double off_mm =
-        (real_from_canonical * at(landmarks, std::string(picked.name)) - real).norm();
-    fmt::print("{:24} {:.1f} mm\n", picked.name, off_mm);
-    sum_mm += off_mm;
+    const Vector3d off_mm = real_from_canonical * at(landmarks, std::string(picked.name)) - real;
+    fmt::print("{:24} {:5.1f} mm ({:.1f} left, {:.1f} back, {:.1f} up)\n", picked.name,
+               off_mm.norm(), off_mm.x(), off_mm.y(), off_mm.z());
+    sum_mm += off_mm.norm();
   }
   fmt::print("{} landmarks: mean {:.2f} mm (at most 4)\n", std::size(kPicked),
              sum_mm / std::size(kPicked));
