@@ -102,8 +102,8 @@ Crown lost_crown(const TriangleMesh& skull, Eigen::Index first, Eigen::Index end
 }
 
 /// The crown's vertices onto the ridge, along lines to where the root was; then, as a membrane
-/// would, evened out on the healed bone: a crown is wider than its neck, so it lies in folds, and it
-/// hid the neighbours' sides, which want to be covered.
+/// would, evened out on the healed bone: a crown is wider than its neck, so it lies in folds, and
+/// it hid the neighbours' sides, which want to be covered.
 void lower(TriangleMesh& skull, const Crown& crown, const ImplicitSolid& healed, int threads) {
   const auto count = static_cast<int>(crown.vertices.size());
   std::vector<Vector3d> places(crown.vertices.size());
