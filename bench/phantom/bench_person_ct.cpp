@@ -77,19 +77,25 @@ struct Worst {
 void print_places(const std::vector<Landmark>& landmarks, const TriangleMesh& mesh,
                   const std::vector<bool>& region, const std::vector<double>& distance_mm) {
   constexpr double kFar_mm = 0.5;
-  std::map<std::string, int> count;
+  struct Place {
+    int vertices = 0;
+    double farthest_mm = 0.0;
+  };
+  std::map<std::string, Place> places;
   for (std::size_t v = 0; v < distance_mm.size(); ++v) {
     if (!region[v] || std::abs(distance_mm[v]) < kFar_mm) continue;
     const Vector3d place = mesh.vertices.row(static_cast<Eigen::Index>(v));
     const auto off_mm = [&](const Landmark& l) { return (l.position_mm - place).norm(); };
-    ++count[std::ranges::min_element(landmarks, {}, off_mm)->name];
+    Place& near = places[std::ranges::min_element(landmarks, {}, off_mm)->name];
+    ++near.vertices;
+    near.farthest_mm = std::max(near.farthest_mm, std::abs(distance_mm[v]));
   }
-  std::vector<std::pair<int, std::string>> most;
-  for (const auto& [name, vertices] : count) most.emplace_back(-vertices, name);
-  std::ranges::sort(most);
+  std::vector<std::pair<std::string, Place>> most(places.begin(), places.end());
+  std::ranges::sort(most, std::greater(), [](const auto& place) { return place.second.vertices; });
   fmt::print(stderr, "farther than {} mm, of {} vertices:", kFar_mm, distance_mm.size());
   for (std::size_t i = 0; i < std::min<std::size_t>(most.size(), 8); ++i) {
-    fmt::print(stderr, " {} {},", most[i].second, -most[i].first);
+    const auto& [name, place] = most[i];
+    fmt::print(stderr, " {} {} (to {:.1f} mm),", name, place.vertices, place.farthest_mm);
   }
   fmt::print(stderr, "\n");
 }

@@ -190,9 +190,8 @@ class Decimator {
         }
       });
       std::ranges::sort(around);
-      const auto repeated = std::ranges::unique(around);
-      const std::size_t neighbors = around.size() - repeated.size();
-      vertex(v).locked = neighbors != corners;
+      around.erase(std::unique(around.begin(), around.end()), around.end());
+      vertex(v).locked = around.size() != corners;
     }
   }
 

@@ -24,6 +24,7 @@ namespace {
 constexpr std::size_t nifti_header_size = 348;
 constexpr std::size_t chunk_size = 1 << 20;
 constexpr double most_bytes = 1.6e10;
+constexpr double most_place = 1e7;  ///< in any unit, of a voxel's size or place
 
 struct GzipCloser {
   void operator()(gzFile_s* file) const { gzclose(file); }
@@ -65,6 +66,21 @@ Result<NiftiLayout> layout_of(const std::array<char, nifti_header_size>& header,
                                 "scan has",
                                 size, offset));
   }
+  // Where the voxels lie: ITK ends the program at a matrix that is not finite.
+  const auto is_place = [&](std::size_t first, std::size_t end) -> Result<void> {
+    for (std::size_t at = first; at < end; at += sizeof(float)) {
+      const double value = read(at, 0.0F);
+      if (std::abs(value) <= most_place) continue;
+      return bad_file(name, fmt::format("byte {}", at),
+                      fmt::format("{} is no size or place of voxels", value));
+    }
+    return {};
+  };
+  if (const auto size_of_voxels = is_place(76, 92); !size_of_voxels) return forward(size_of_voxels);
+  const bool by_quaternion = read(252, std::int16_t{}) > 0;
+  const bool by_matrix = read(254, std::int16_t{}) > 0;
+  if (const auto place = is_place(256, by_quaternion ? 280 : 256); !place) return forward(place);
+  if (const auto place = is_place(280, by_matrix ? 328 : 280); !place) return forward(place);
   layout.offset = static_cast<std::size_t>(offset);
   layout.size = static_cast<std::size_t>(size);
   const int type = read(70, std::int16_t{});

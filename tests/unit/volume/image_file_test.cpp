@@ -174,6 +174,22 @@ TEST(ImageFile, TruncatedAndAbsurdNiftiIsRefused) {
   EXPECT_THAT(four.error().message(), HasSubstr("not one 3-D volume"));
 }
 
+TEST(ImageFile, NiftiWithoutAPlaceIsRefused) {
+  const auto matrix = read_changed([](std::string& b) {
+    patch(b, 254, std::int16_t{1});
+    patch(b, 300, std::numeric_limits<float>::quiet_NaN());
+  });
+  ASSERT_FALSE(matrix);
+  EXPECT_THAT(matrix.error().message(), HasSubstr("byte 300"));
+  const auto quaternion = read_changed([](std::string& b) {
+    patch(b, 252, std::int16_t{1});
+    patch(b, 256, 1e30F);
+  });
+  ASSERT_FALSE(quaternion);
+  EXPECT_THAT(quaternion.error().message(), HasSubstr("no size or place of voxels"));
+  EXPECT_FALSE(read_changed([](std::string& b) { patch(b, 80, 1e30F); }));
+}
+
 TEST(ImageFile, NrrdAndMetaImageHaveMillimetresByConvention) {
   const auto a = read_text("a.nrrd", nrrd + "\n", 24);
   const auto b = read_text("a.mha", mha, 24);
