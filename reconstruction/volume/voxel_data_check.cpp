@@ -146,6 +146,12 @@ Result<void> check_nifti_data(const fs::path& path) {
 Result<void> check_meta_image_data(const fs::path& path) {
   const std::string name = path.string();
   const TextHeader header = read_text_header(path, '=');
+  // Before ITK, which reads as many numbers as the header says the space has dimensions.
+  if (int dimensions = 0;
+      !parse_number(std::string_view(header.first_word("NDims")), dimensions) || dimensions != 3) {
+    return bad_file(name, "header",
+                    fmt::format("NDims is \"{}\", not 3", header.first_word("NDims")));
+  }
   const std::string data_file = header.first_word("ElementDataFile");
   if (data_file.empty()) return bad_file(name, "header", "ElementDataFile is missing");
   double size = static_cast<double>(meta_type_size(header.first_word("ElementType")));

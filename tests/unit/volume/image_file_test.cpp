@@ -241,6 +241,16 @@ TEST(ImageFile, TruncatedNrrdAndMetaImageAreRefused) {
   EXPECT_FALSE(read_text("a.mha", mha.substr(0, 40), 0));
 }
 
+TEST(ImageFile, AMetaImageOfOtherThanThreeDimensionsIsRefused) {
+  for (const char* dimensions : {"4", "3555555555555555", "", "x"}) {
+    std::string header = mha;
+    header.replace(header.find("NDims = 3"), 9, std::string("NDims = ") + dimensions);
+    const auto read = read_text("a.mha", header, 24);
+    ASSERT_FALSE(read) << dimensions;
+    EXPECT_THAT(read.error().message(), HasSubstr("NDims")) << dimensions;
+  }
+}
+
 TEST(ImageFile, NamesThatAreNoVolumeAreRefused) {
   const TemporaryFolder folder;
   EXPECT_THAT(read_volume(folder / "a.nii", {}).error().message(), HasSubstr("does not exist"));
