@@ -6,9 +6,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "core/linear_algebra.h"
+#include "core/median.h"
 #include "core/parallel.h"
 #include "reconstruction/distance/pseudo_normals.h"
 #include "reconstruction/distance/surface_samples.h"
@@ -87,6 +90,20 @@ void keep_closest(std::vector<Pair>& pairs, double share) {
   pairs.resize(static_cast<std::size_t>(std::ceil(share * static_cast<double>(pairs.size()))));
 }
 
+/// What lies farther apart than this belongs to one of the surfaces alone: so many times the median
+/// distance, seen from the surface that has the less of its own.
+double reach_of(const std::vector<Pair>& pairs, std::size_t count_a) {
+  constexpr double kMedians = 5.0;
+  constexpr double kLeast_mm = 0.01;
+  const auto median_of = [&](std::size_t begin, std::size_t end) {
+    std::vector<double> distances;
+    for (std::size_t i = begin; i < end; ++i) distances.push_back(pairs[i].distance_mm);
+    return median(std::move(distances));
+  };
+  return std::max(kLeast_mm,
+                  kMedians * std::min(median_of(0, count_a), median_of(count_a, pairs.size())));
+}
+
 /// The small motion about `center` that brings A's points onto the planes at B's: rotation vector,
 /// translation, relative scale. Linearised least squares.
 Result<Similarity3> best_step(const std::vector<Pair>& pairs, const Eigen::Vector3d& center,
@@ -134,36 +151,45 @@ Extent extent_of(const std::vector<Eigen::Vector3d>& points) {
   return extent;
 }
 
+/// First with a fixed share of the pairs, which pulls from afar; then with those alone that belong
+/// together, for what only one surface has (a skull's inner walls, beside a scan of the outside)
+/// may be more than the share leaves out, and would pull the fit aside.
 Result<TrimmedIcpResult> run_from(const Similarity3& start, const Surface& a, const Surface& b,
                                   const TrimmedIcpOptions& options, const Progress& progress) {
   TrimmedIcpResult result;
   result.b_from_a = start;
   const Extent extent = extent_of(b.points);
-  while (result.iterations < options.max_iterations && !result.converged) {
-    if (progress.stop.stop_requested()) {
-      return fail(ErrorKind::cancelled, "alignment", "was cancelled");
+  double reach_mm = std::numeric_limits<double>::infinity();
+  for (const bool by_reach : {false, true}) {
+    result.converged = false;
+    for (int i = 0; i < options.max_iterations && !result.converged; ++i) {
+      if (progress.stop.stop_requested()) {
+        return fail(ErrorKind::cancelled, "alignment", "was cancelled");
+      }
+      progress.report((by_reach ? 0.5 : 0.0) + 0.5 * i / options.max_iterations, "aligning");
+      auto pairs = correspondences(a, b, result.b_from_a, options.threads);
+      if (by_reach) {
+        // Never wider again, so that the iteration comes to rest.
+        reach_mm = std::min(reach_mm, reach_of(pairs, a.points.size()));
+        std::erase_if(pairs, [&](const Pair& pair) { return pair.distance_mm > reach_mm; });
+      } else {
+        keep_closest(pairs, options.kept_share);
+      }
+      const auto step = best_step(pairs, extent.center, extent.radius_mm, options.estimate_scale);
+      if (!step) return forward(step);
+      result.b_from_a = *step * result.b_from_a;
+      ++result.iterations;
+      double moved_mm = 0.0;
+      double sum = 0.0;
+      for (const Pair& pair : pairs) {
+        moved_mm = std::max(moved_mm, (*step * pair.on_a - pair.on_a).norm());
+        const double gap = (pair.on_b - pair.on_a).dot(pair.normal);
+        sum += gap * gap;
+      }
+      result.converged = moved_mm < options.tolerance_mm;
+      result.kept_rms_mm = std::sqrt(sum / static_cast<double>(pairs.size()));
     }
-    progress.report(static_cast<double>(result.iterations) / options.max_iterations, "aligning");
-    auto pairs = correspondences(a, b, result.b_from_a, options.threads);
-    keep_closest(pairs, options.kept_share);
-    const auto step = best_step(pairs, extent.center, extent.radius_mm, options.estimate_scale);
-    if (!step) return forward(step);
-    result.b_from_a = *step * result.b_from_a;
-    ++result.iterations;
-    double moved_mm = 0.0;
-    for (const Pair& pair : pairs) {
-      moved_mm = std::max(moved_mm, (*step * pair.on_a - pair.on_a).norm());
-    }
-    result.converged = moved_mm < options.tolerance_mm;
   }
-  auto pairs = correspondences(a, b, result.b_from_a, options.threads);
-  keep_closest(pairs, options.kept_share);
-  double sum = 0.0;
-  for (const Pair& pair : pairs) {
-    const double gap = (pair.on_b - pair.on_a).dot(pair.normal);
-    sum += gap * gap;
-  }
-  result.trimmed_rms_mm = std::sqrt(sum / static_cast<double>(pairs.size()));
   return result;
 }
 
@@ -198,7 +224,7 @@ Result<TrimmedIcpResult> align_by_trimmed_icp(const TriangleMesh& a, const Trian
   start.translation = extent_b.center - start.scale * extent_a.center;
   const auto other = run_from(start, surface_a, surface_b, options, progress.part(0.5, 1.0));
   if (!other) return best ? best : other;
-  return best && best->trimmed_rms_mm <= other->trimmed_rms_mm ? best : other;
+  return best && best->kept_rms_mm <= other->kept_rms_mm ? best : other;
 }
 
 }  // namespace skullstation

@@ -9,11 +9,11 @@ namespace skullstation {
 
 struct TrimmedIcpOptions {
   bool estimate_scale = false;
-  /// Share of the closest correspondences that take part; the rest (what only one of the surfaces
-  /// has) is left out. Chetverikov et al. 2002.
+  /// Share of the closest correspondences that take part at first (Chetverikov et al. 2002); at
+  /// last it is those within five median distances.
   double kept_share = 0.9;
-  int samples = 4000;  ///< taken from either surface
-  int max_iterations = 100;
+  int samples = 4000;          ///< taken from either surface
+  int max_iterations = 100;    ///< of either stage
   double tolerance_mm = 1e-5;  ///< done when no sample moves farther
   int threads = 0;             ///< 0: all
 
@@ -21,8 +21,8 @@ struct TrimmedIcpOptions {
 };
 
 struct TrimmedIcpResult {
-  Similarity3 b_from_a;         ///< x_b = scale * R x_a + t; scale 1 unless estimated
-  double trimmed_rms_mm = 0.0;  ///< point to plane, over the correspondences kept
+  Similarity3 b_from_a;      ///< x_b = scale * R x_a + t; scale 1 unless estimated
+  double kept_rms_mm = 0.0;  ///< point to plane, over the correspondences kept in the end
   int iterations = 0;
   bool converged = false;
 };
