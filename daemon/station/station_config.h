@@ -14,6 +14,7 @@
 #include "core/result.h"
 #include "core/session/charuco_board.h"
 #include "core/session/lens.h"
+#include "daemon/delivery/target_config.h"
 #include "daemon/station/config_fields.h"
 #include "firmware_io/gpio_station.h"
 #include "firmware_io/simulated_station.h"
@@ -71,11 +72,29 @@ struct EvidenceConfig {
   std::string audit_log;  ///< file; empty: none is kept
 };
 
+/// Where sealed packages go (docs/delivery.md).
+struct DeliveryConfig {
+  std::string folder = "outbox";
+  std::vector<TargetConfig> targets;
+};
+
 /// Where skullstationd keeps cases, and for how long.
 struct StorageConfig {
   std::string folder = "/var/lib/skullstation";
   /// After every delivery of a case was verified; 0: for ever.
   int keep_days = 0;
+};
+
+/// Where and how skullstationd shows its console.
+struct HttpConfig {
+  bool enabled = true;
+  /// 127.0.0.1: this machine alone; 0.0.0.0: the network. Before set-up always this machine alone.
+  std::string address = "127.0.0.1";
+  int port = 8443;          ///< 0: a free one
+  std::string certificate;  ///< PEM, the chain; empty: the station's own
+  std::string key;          ///< PEM
+  int idle_min = 60;        ///< a sign-in ends after so long without a request
+  int sign_in_hours = 12;   ///< and after so long in any case
 };
 
 enum class JobQuality { draft, standard, fine };
@@ -106,8 +125,10 @@ struct StationConfig {
   QualityGates gates;
   SimulationConfig simulation;
   EvidenceConfig evidence;
+  DeliveryConfig delivery;
   StorageConfig storage;
   JobsConfig jobs;
+  HttpConfig http;
 
   static std::vector<CameraConfig> simulated_pair();
 };
