@@ -19,6 +19,7 @@ pkg_check_modules(gpiod REQUIRED IMPORTED_TARGET libgpiod)
 pkg_check_modules(exiv2 REQUIRED IMPORTED_TARGET exiv2)
 pkg_check_modules(libjpeg REQUIRED IMPORTED_TARGET libjpeg)
 pkg_check_modules(sqlite3 REQUIRED IMPORTED_TARGET sqlite3)
+pkg_check_modules(curl REQUIRED IMPORTED_TARGET libcurl)
 pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
 # CSI cameras only; a station with USB cameras builds and runs without it.
 pkg_check_modules(libcamera IMPORTED_TARGET libcamera)

@@ -109,6 +109,39 @@ void add_evidence_commands(CLI::App& app, Command& chosen) {
       });
 }
 
+void add_delivery_commands(CLI::App& app, Command& chosen) {
+  constexpr const char* config = "station.toml: its targets and its outbox";
+  CLI::App* deliver = app.add_subcommand("deliver", "bring packages to case systems");
+  deliver->require_subcommand(1);
+  add<DeliverTestCommand>(*deliver, "test", "send a target a probe, read it back, remove it",
+                          chosen, [](CLI::App& test, DeliverTestCommand& o) {
+                            test.add_option("TARGET", o.target, "its name")->required();
+                            test.add_option("--config", o.config, config)->required();
+                          });
+  add<DeliverListCommand>(*deliver, "list", "what is in the outbox, and how far it is", chosen,
+                          [](CLI::App& list, DeliverListCommand& o) {
+                            list.add_option("--config", o.config, config)->required();
+                          });
+  add<DeliverRetryCommand>(*deliver, "retry", "try a delivery again now", chosen,
+                           [](CLI::App& retry, DeliverRetryCommand& o) {
+                             retry.add_option("ID", o.id, "as `list` shows it")->required();
+                             retry.add_option("--config", o.config, config)->required();
+                           });
+  add<DeliverHoldCommand>(*deliver, "hold", "keep a delivery back until it is retried", chosen,
+                          [](CLI::App& hold, DeliverHoldCommand& o) {
+                            hold.add_option("ID", o.id, "as `list` shows it")->required();
+                            hold.add_option("--config", o.config, config)->required();
+                          });
+  add<DeliverSendCommand>(
+      *deliver, "send", "send a package; it is in the outbox until it was read back", chosen,
+      [](CLI::App& send, DeliverSendCommand& o) {
+        send.add_option("PACKAGE", o.package, "the package's folder")->required();
+        send.add_option("--config", o.config, config)->required();
+        send.add_option("--to", o.targets,
+                        "a target's name; may be given several times (default: all enabled)");
+      });
+}
+
 void add_commands(CLI::App& app, Command& chosen) {
   add<DemoCommand>(app, "demo", "the whole main job on a simulated station", chosen,
                    [](CLI::App& demo, DemoCommand& o) {
@@ -388,6 +421,7 @@ void add_commands(CLI::App& app, Command& chosen) {
       });
 
   add_evidence_commands(app, chosen);
+  add_delivery_commands(app, chosen);
 
   add<StepCommand>(
       app, "step", "one step of a case; called by skullstationd", chosen,

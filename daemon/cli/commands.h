@@ -213,6 +213,41 @@ struct VerifyCommand {
 };
 Result<CommandReport> run(const VerifyCommand&, const CommonOptions&, const Progress&);
 
+/// Sends a probe to a target, reads it back, removes it.
+struct DeliverTestCommand {
+  std::filesystem::path config;
+  std::string target;
+};
+Result<CommandReport> run(const DeliverTestCommand&, const CommonOptions&, const Progress&);
+
+/// What is in the outbox and how far it is.
+struct DeliverListCommand {
+  std::filesystem::path config;
+};
+Result<CommandReport> run(const DeliverListCommand&, const CommonOptions&, const Progress&);
+
+/// Tries a delivery again now, whatever kept it.
+struct DeliverRetryCommand {
+  std::filesystem::path config;
+  std::int64_t id = 0;
+};
+Result<CommandReport> run(const DeliverRetryCommand&, const CommonOptions&, const Progress&);
+
+/// Keeps a delivery back until it is retried.
+struct DeliverHoldCommand {
+  std::filesystem::path config;
+  std::int64_t id = 0;
+};
+Result<CommandReport> run(const DeliverHoldCommand&, const CommonOptions&, const Progress&);
+
+/// Checks a package, puts it into the outbox for every target or some, and sends it.
+struct DeliverSendCommand {
+  std::filesystem::path config;
+  std::filesystem::path package;
+  std::vector<std::string> targets;  ///< names; empty: all that are enabled
+};
+Result<CommandReport> run(const DeliverSendCommand&, const CommonOptions&, const Progress&);
+
 /// Makes the keys that a station signs with.
 struct KeysCreateCommand {
   std::filesystem::path folder;

@@ -144,6 +144,29 @@ void visit_simulation(SimulationConfig& simulation, ConfigFields& fields) {
   fields.field("estop_stuck", faults.estop_stuck, "fault: the stop can't be reset");
 }
 
+void visit_target(TargetConfig& target, ConfigFields& fields) {
+  fields.field("name", target.name, "of the receiver in the outbox");
+  fields.field("protocol", target.protocol,
+               {"folder", "webdav", "s3", "sftp", "dicom", "stow", "fhir"}, "how it is spoken to");
+  fields.field("address", target.address,
+               "absolute path, or URL: https://, sftp://, dicoms:// without user and password");
+  fields.field("enabled", target.enabled, "false: nothing is sent to it for now");
+  fields.field("hours", target.hours, "UTC, like 20:00-06:00, when it is sent to; empty: always");
+  fields.field("user", target.user, "who logs in; s3: the access key's id");
+  fields.field("secret", target.secret,
+               "WHERE the password, token or key is: a systemd credential's name or the path of a "
+               "file that nobody else may read");
+  fields.field("ca_file", target.ca_file, "PEM: who vouches for it; empty: the system's list");
+  fields.field("certificate_file", target.certificate_file, "PEM: this station's own");
+  fields.field("key_file", target.key_file, "PEM: the key of it; sftp: the key to log in with");
+  fields.field("host_key_sha256", target.host_key_sha256, "sftp: SHA256:... of its host key");
+  fields.field("region", target.region, "s3");
+  fields.field("called_ae", target.called_ae, "dicom: its AE title");
+  fields.field("calling_ae", target.calling_ae, "dicom: this station's AE title");
+  fields.field("mounted", target.mounted, "folder: must be a mounted file system");
+  fields.field("max_photographs", target.max_photographs, "dicom, stow: unset: all are sent");
+}
+
 /// Finds the line that set the key a validation complains about, if a file did.
 Error with_origin(Error error, const std::map<std::string, std::string>& origins) {
   const auto origin = origins.find(error.where);
@@ -197,6 +220,16 @@ std::vector<Error> invalid_values(const StationConfig& config) {
     complain("station.calibration_valid_days", "must be at least 1");
   }
   if (config.camera_check_s < 0) complain("station.camera_check_s", "must be 0 or more");
+  if (config.delivery.folder.empty()) complain("delivery.folder", "must name a folder");
+  std::set<std::string> targets;
+  for (std::size_t i = 0; i < config.delivery.targets.size(); ++i) {
+    const TargetConfig& target = config.delivery.targets[i];
+    const std::string key = fmt::format("delivery.targets[{}]", i);
+    check(key, target.validate());
+    if (!targets.insert(target.name).second) {
+      complain(key + ".name", fmt::format("\"{}\" is used twice", target.name));
+    }
+  }
   if (config.storage.folder.empty()) complain("storage.folder", "must name a folder");
   if (config.storage.keep_days < 0) complain("storage.keep_days", "must be 0 or more");
   if (config.jobs.memory_mib < 256) complain("jobs.memory_mib", "must be at least 256");
@@ -252,6 +285,13 @@ void visit_config(StationConfig& config, ConfigFields& fields) {
                  "what packages and the audit log are signed with (skullstation keys create)");
     fields.field("audit_log", config.evidence.audit_log,
                  "file of the station's audit log; empty: none is kept");
+  });
+  fields.table("delivery", [&] {
+    fields.field("folder", config.delivery.folder, "of the outbox");
+    fields.tables(
+        "targets", config.delivery.targets.size(),
+        [&](std::size_t count) { config.delivery.targets.assign(count, TargetConfig{}); },
+        [&](std::size_t i) { visit_target(config.delivery.targets[i], fields); });
   });
   fields.table("storage", [&] {
     fields.field("folder", config.storage.folder, "where skullstationd keeps its cases");

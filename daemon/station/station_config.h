@@ -14,6 +14,7 @@
 #include "core/result.h"
 #include "core/session/charuco_board.h"
 #include "core/session/lens.h"
+#include "daemon/delivery/target_config.h"
 #include "daemon/station/config_fields.h"
 #include "firmware_io/gpio_station.h"
 #include "firmware_io/simulated_station.h"
@@ -71,6 +72,12 @@ struct EvidenceConfig {
   std::string audit_log;  ///< file; empty: none is kept
 };
 
+/// Where sealed packages go (docs/delivery.md).
+struct DeliveryConfig {
+  std::string folder = "outbox";
+  std::vector<TargetConfig> targets;
+};
+
 /// Where skullstationd keeps cases, and for how long.
 struct StorageConfig {
   std::string folder = "/var/lib/skullstation";
@@ -106,6 +113,7 @@ struct StationConfig {
   QualityGates gates;
   SimulationConfig simulation;
   EvidenceConfig evidence;
+  DeliveryConfig delivery;
   StorageConfig storage;
   JobsConfig jobs;
 

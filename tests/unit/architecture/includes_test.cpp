@@ -53,7 +53,8 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"daemon/service", {"core", "core/session", "firmware_io", "daemon/station", "daemon/jobs"}},
     {"daemon/station",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
-      "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/phantom"}},
+      "capture/simulation", "capture/scan", "reconstruction/io", "reconstruction/phantom",
+      "daemon/delivery"}},
     {"daemon/jobs", {"core"}},
     {"daemon/report", {"core", "core/session", "reconstruction/rendering"}},
     {"daemon/subject",
@@ -67,6 +68,8 @@ const std::map<std::string, std::set<std::string>> allowed = {
       "reconstruction/registration", "reconstruction/statistics", "reconstruction/approximation",
       "daemon/report"}},
     {"daemon/evidence", {"core", "core/session"}},
+    {"daemon/delivery",
+     {"core", "core/session", "reconstruction/io", "daemon/evidence", "daemon/jobs"}},
     {"daemon/cli",
      {"core",
       "core/session",
@@ -90,6 +93,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
       "daemon/model",
       "daemon/case",
       "daemon/evidence",
+      "daemon/delivery",
       "daemon/report"}},
 };
 
