@@ -6,9 +6,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "daemon/cli/terminal.h"
+#include "daemon/delivery/outbox_loop.h"
 #include "daemon/service/control_commands.h"
 #include "daemon/service/control_socket.h"
 #include "daemon/service/station_service.h"
@@ -60,6 +62,19 @@ Result<ServiceOptions> service_options(const DaemonOptions& options) {
   return service;
 }
 
+/// Nothing where packages go nowhere.
+Result<std::unique_ptr<OutboxLoop>> start_outbox(const StationConfig& config) {
+  if (config.delivery.targets.empty()) return std::unique_ptr<OutboxLoop>();
+  auto sender = sender_options(config.delivery.targets, config.evidence.audit_log,
+                               config.evidence.keys_folder, config.station_id, "skullstationd");
+  if (!sender) return forward(sender);
+  sender->told = [](const Delivery& d) {
+    fmt::print(stderr, "delivery {} of {} to {}: {}{}\n", d.id, d.case_number, d.target,
+               to_string(d.state), d.last_error ? ", " + *d.last_error : "");
+  };
+  return OutboxLoop::start(config.delivery.folder, *std::move(sender));
+}
+
 Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
   const auto service_with = service_options(options);
   if (!service_with) return forward(service_with);
@@ -70,6 +85,8 @@ Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
   const auto control = ControlSocket::open(
       socket, [&service](const std::string& line) { return answer_control(**service, line); });
   if (!control) return forward(control);
+  const auto outbox = start_outbox(service_with->config);
+  if (!outbox) return forward(outbox);
   fmt::print(stderr, "station {}: cases in {}\n", service_with->config.station_id,
              service_with->config.storage.folder);
   sd_notify(0, "READY=1");

@@ -74,21 +74,12 @@ int exit_code_of(const std::vector<Delivery>& deliveries) {
   return on_its_way ? exit_code(ErrorKind::hardware) : 0;
 }
 
-Result<SenderOptions> sender_options(const StationConfig& config) {
-  SenderOptions options;
-  options.targets = config.delivery.targets;
-  if (config.evidence.audit_log.empty()) return options;
-  auto keys = read_station_keys(config.evidence.keys_folder);
-  if (!keys) return forward(keys);
-  options.audit = DeliveryAudit{
-      {config.evidence.audit_log, config.station_id}, *std::move(keys), "skullstation deliver"};
-  return options;
-}
-
 /// Sends what has one of the ids and tells what has become of it.
 Result<CommandReport> send_now(Outbox& outbox, const StationConfig& config,
                                const std::vector<std::int64_t>& ids, const Progress& progress) {
-  const auto options = sender_options(config);
+  const auto options =
+      sender_options(config.delivery.targets, config.evidence.audit_log,
+                     config.evidence.keys_folder, config.station_id, "skullstation deliver");
   if (!options) return forward(options);
   const auto sent = send_due(outbox, *options, SystemClock(), progress, ids);
   if (!sent) return forward(sent);

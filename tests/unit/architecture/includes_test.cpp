@@ -49,7 +49,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
     {"reconstruction/photogrammetry",
      {"core", "core/adjustment", "core/session", "reconstruction/io", "reconstruction/distance",
       "reconstruction/registration", "reconstruction/mesh"}},
-    {"daemon", {"daemon/cli", "daemon/service", "reconstruction/rendering"}},
+    {"daemon", {"daemon/cli", "daemon/delivery", "daemon/service", "reconstruction/rendering"}},
     {"daemon/service", {"core", "core/session", "firmware_io", "daemon/station", "daemon/jobs"}},
     {"daemon/station",
      {"core", "core/session", "firmware_io", "capture/cameras", "capture/calibration",
