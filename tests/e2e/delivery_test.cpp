@@ -38,7 +38,8 @@ class Deliver : public ::testing::Test {
     configure("");
   }
   void configure(const std::string& more) {
-    fs::copy(testing::test_keys_folder(), folder_ / "keys", fs::copy_options::skip_existing);
+    fs::copy(testing::test_keys_folder(), folder_ / "keys",
+             fs::copy_options::skip_existing | fs::copy_options::recursive);
     ASSERT_TRUE(write_file_durably(
         folder_ / "station.toml",
         "[station]\nid = \"ST-01\"\n[evidence]\nkeys_folder = \"" + (folder_ / "keys").string() +
