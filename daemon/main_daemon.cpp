@@ -10,6 +10,7 @@
 #include <string>
 
 #include "daemon/cli/terminal.h"
+#include "daemon/delivery/outbox_loop.h"
 #include "daemon/http/console_server.h"
 #include "daemon/service/control_commands.h"
 #include "daemon/service/control_socket.h"
@@ -56,6 +57,7 @@ Result<ServiceOptions> service_options(const DaemonOptions& options) {
   const std::filesystem::path storage = service.config.storage.folder;
   evidence.keys_folder = storage / evidence.keys_folder;  // where it was relative
   if (evidence.audit_log.empty()) evidence.audit_log = storage / "audit.log";
+  service.config.delivery.folder = storage / service.config.delivery.folder;
   const auto program = options.step_program.empty()
                            ? skullstation_beside()
                            : std::filesystem::absolute(options.step_program);
@@ -78,6 +80,19 @@ void print_address(const ConsoleServer& console, const std::string& address) {
              console.setup_code());
 }
 
+/// Nothing where packages go nowhere.
+Result<std::unique_ptr<OutboxLoop>> start_outbox(const StationConfig& config) {
+  if (config.delivery.targets.empty()) return std::unique_ptr<OutboxLoop>();
+  auto sender = sender_options(config.delivery.targets, config.evidence.audit_log,
+                               config.evidence.keys_folder, config.station_id, "skullstationd");
+  if (!sender) return forward(sender);
+  sender->told = [](const Delivery& d) {
+    fmt::print(stderr, "delivery {} of {} to {}: {}{}\n", d.id, d.case_number, d.target,
+               to_string(d.state), d.last_error ? ", " + *d.last_error : "");
+  };
+  return OutboxLoop::start(config.delivery.folder, *std::move(sender));
+}
+
 Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
   const auto service_with = service_options(options);
   if (!service_with) return forward(service_with);
@@ -95,6 +110,8 @@ Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
     console = *std::move(opened);
     print_address(*console, service_with->config.http.address);
   }
+  const auto outbox = start_outbox(service_with->config);
+  if (!outbox) return forward(outbox);
   fmt::print(stderr, "station {}: cases in {}\n", service_with->config.station_id,
              service_with->config.storage.folder);
   sd_notify(0, "READY=1");

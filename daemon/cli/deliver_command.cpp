@@ -74,23 +74,15 @@ int exit_code_of(const std::vector<Delivery>& deliveries) {
   return on_its_way ? exit_code(ErrorKind::hardware) : 0;
 }
 
-Result<SenderOptions> sender_options(const StationConfig& config) {
-  SenderOptions options;
-  options.targets = config.delivery.targets;
-  if (config.evidence.audit_log.empty()) return options;
-  auto keys = read_station_keys(config.evidence.keys_folder);
-  if (!keys) return forward(keys);
-  options.audit = DeliveryAudit{
-      {config.evidence.audit_log, config.station_id}, *std::move(keys), "skullstation deliver"};
-  return options;
+Result<SenderOptions> options_of(const StationConfig& config) {
+  return sender_options(config.delivery.targets, config.evidence.audit_log,
+                        config.evidence.keys_folder, config.station_id, "skullstation deliver");
 }
 
 /// Sends what has one of the ids and tells what has become of it.
-Result<CommandReport> send_now(Outbox& outbox, const StationConfig& config,
+Result<CommandReport> send_now(Outbox& outbox, const SenderOptions& options,
                                const std::vector<std::int64_t>& ids, const Progress& progress) {
-  const auto options = sender_options(config);
-  if (!options) return forward(options);
-  const auto sent = send_due(outbox, *options, SystemClock(), progress, ids);
+  const auto sent = send_due(outbox, options, SystemClock(), progress, ids);
   if (!sent) return forward(sent);
   CommandReport report;
   if (!*sent) report.text = "another program sends from this outbox just now and will send it\n";
@@ -170,11 +162,13 @@ Result<CommandReport> run(const DeliverRetryCommand& command, const CommonOption
   if (!outbox) return forward(outbox);
   const auto row = (*outbox)->find(command.id);
   if (!row) return forward(row);
+  const auto options = options_of(*config);
+  if (!options) return forward(options);
   // What is queued needs no decision, only a sender.
   if (row->state != DeliveryState::queued) {
     if (const auto queued = (*outbox)->retry(command.id); !queued) return forward(queued);
   }
-  return send_now(**outbox, *config, {command.id}, progress);
+  return send_now(**outbox, *options, {command.id}, progress);
 }
 
 Result<CommandReport> run(const DeliverHoldCommand& command, const CommonOptions&,
@@ -209,6 +203,8 @@ Result<CommandReport> run(const DeliverSendCommand& command, const CommonOptions
     return fail(ErrorKind::usage, command.config.string(), "has no target that is enabled",
                 "add one as [[delivery.targets]] (docs/delivery.md)");
   }
+  const auto options = options_of(*config);
+  if (!options) return forward(options);
   const auto check = check_package(command.package, {}, progress.part(0.0, 0.2));
   if (!check) return forward(check);
   if (!check->findings.empty()) {
@@ -227,7 +223,7 @@ Result<CommandReport> run(const DeliverSendCommand& command, const CommonOptions
     if (!row) return forward(row);
     ids.push_back(row->id);
   }
-  return send_now(**outbox, *config, ids, progress.part(0.2, 1.0));
+  return send_now(**outbox, *options, ids, progress.part(0.2, 1.0));
 }
 
 }  // namespace skullstation

@@ -153,6 +153,18 @@ Result<ProbeResult> try_target(const TargetConfig& target, const std::string& st
   return ProbeResult{probe->name, *removed};
 }
 
+Result<SenderOptions> sender_options(std::vector<TargetConfig> targets, const fs::path& audit_log,
+                                     const fs::path& keys_folder, const std::string& station,
+                                     const std::string& who) {
+  SenderOptions options;
+  options.targets = std::move(targets);
+  if (audit_log.empty()) return options;
+  auto keys = read_station_keys(keys_folder);
+  if (!keys) return forward(keys);
+  options.audit = DeliveryAudit{{audit_log, station}, *std::move(keys), who};
+  return options;
+}
+
 Result<bool> send_due(Outbox& outbox, const SenderOptions& options, const Clock& clock,
                       const Progress& progress,
                       const std::optional<std::vector<std::int64_t>>& ids) {

@@ -43,6 +43,12 @@ struct SenderOptions {
   std::function<void(const Delivery&)> told = [](const Delivery&) {};
 };
 
+/// With an audit log (unless `audit_log` is empty) and the keys to sign it.
+Result<SenderOptions> sender_options(std::vector<TargetConfig> targets,
+                                     const std::filesystem::path& audit_log,
+                                     const std::filesystem::path& keys_folder,
+                                     const std::string& station, const std::string& who);
+
 /// Tries, once, everything in the outbox that is due, or only what has one of `ids`. Returns
 /// whether it had the right to: false while another process sends. What happens to a delivery is
 /// in its row; fails only where the outbox itself does, and with `cancelled` on request.

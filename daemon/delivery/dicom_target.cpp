@@ -134,7 +134,8 @@ class DicomTarget final : public Target {
     return fail(ErrorKind::hardware, config_.address,
                 fmt::format("does not answer, or the connection was cut or not trusted ({})",
                             condition.text()),
-                "see whether it runs; with TLS whether both sides' certificates are valid");
+                "see whether it runs and knows this station's AE title; with TLS whether both "
+                "sides' certificates are valid");
   }
 
   static tl::unexpected<Error> stopped(const DeliveryObject& object) {
@@ -177,37 +178,59 @@ class DicomTarget final : public Target {
     OFList<OFString> plain;
     plain.push_back(UID_LittleEndianExplicitTransferSyntax);
     plain.push_back(UID_LittleEndianImplicitTransferSyntax);
+    scu.addPresentationContext(UID_FINDStudyRootQueryRetrieveInformationModel, plain);
     scu.addPresentationContext(UID_GETStudyRootQueryRetrieveInformationModel, plain);
     scu.addPresentationContext(of(instance->sop_class_uid), stored_as, ASC_SC_ROLE_SCP);
     if (auto connected = connect(scu); !connected) return forward(connected);
-    const T_ASC_PresentationContextID context =
-        scu.findPresentationContextID(UID_GETStudyRootQueryRetrieveInformationModel, "");
-    if (context == 0) {
-      scu.releaseAssociation();
-      return refused_kind();
-    }
+    auto sum = ask(scu, *instance);
+    scu.releaseAssociation();
+    return sum;
+  }
+
+  /// Is it there (C-FIND), and if so: what is it (C-GET)? Receivers answer C-GET for what they
+  /// don't have with an error, or with nothing.
+  template <class Scu>
+  Result<std::optional<std::string>> ask(Scu& scu, const DicomInstance& instance) const {
+    const auto context_of = [&](const char* model) {
+      return scu.findPresentationContextID(model, "");
+    };
+    const auto find = context_of(UID_FINDStudyRootQueryRetrieveInformationModel);
+    const auto get = context_of(UID_GETStudyRootQueryRetrieveInformationModel);
+    if (find == 0 || get == 0) return refused_kind();
     DcmDataset keys;
     keys.putAndInsertString(DCM_QueryRetrieveLevel, "IMAGE");
-    keys.putAndInsertString(DCM_StudyInstanceUID, instance->study_uid.c_str());
-    keys.putAndInsertString(DCM_SeriesInstanceUID, instance->series_uid.c_str());
-    keys.putAndInsertString(DCM_SOPInstanceUID, instance->instance_uid.c_str());
-    OFList<RetrieveResponse*> responses;
-    const OFCondition asked = scu.sendCGETRequest(context, &keys, &responses);
+    keys.putAndInsertString(DCM_StudyInstanceUID, instance.study_uid.c_str());
+    keys.putAndInsertString(DCM_SeriesInstanceUID, instance.series_uid.c_str());
+    keys.putAndInsertString(DCM_SOPInstanceUID, instance.instance_uid.c_str());
+    OFList<QRResponse*> matches;
+    if (const OFCondition asked = scu.sendFINDRequest(find, &keys, &matches); asked.bad()) {
+      return trouble(asked);
+    }
+    bool is_there = false;
     Uint16 status = 0xffff;
+    for (QRResponse* match : matches) {
+      status = match->m_status;
+      is_there = is_there || match->m_dataset != nullptr;
+      delete match;
+    }
+    if (status != 0) return cant_tell(status);
+    if (!is_there) return std::optional<std::string>();
+    OFList<RetrieveResponse*> responses;
+    const OFCondition asked = scu.sendCGETRequest(get, &keys, &responses);
     for (RetrieveResponse* response : responses) {
       status = response->m_status;
       delete response;
     }
-    scu.releaseAssociation();
     if (asked.bad()) return trouble(asked);
-    if (scu.received) {
-      if (!*scu.received) return forward(*scu.received);
-      return std::optional<std::string>(**scu.received);
-    }
-    if (status == 0) return std::optional<std::string>();
+    if (!scu.received) return cant_tell(status);
+    if (!*scu.received) return forward(*scu.received);
+    return std::optional<std::string>(**scu.received);
+  }
+
+  tl::unexpected<Error> cant_tell(Uint16 status) const {
     return fail(ErrorKind::hardware, config_.address,
-                fmt::format("can't give the object back (DICOM status {:04X})", status),
-                "C-GET must be allowed there for this station");
+                fmt::format("does not give the object back (DICOM status {:04X})", status),
+                "C-FIND and C-GET must be allowed there for this station");
   }
 
   TargetConfig config_;

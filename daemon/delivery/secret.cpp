@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 #include <openssl/crypto.h>
-#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -74,7 +74,9 @@ Result<void> check_secret_file(const fs::path& file) {
     return fail(ErrorKind::bad_input, file.string(), "is a secret that belongs to another user",
                 "it must belong to root or to the user of this program");
   }
-  ::prctl(PR_SET_DUMPABLE, 0);
+  // Not PR_SET_DUMPABLE: it would give /proc/self to root, and steps need theirs.
+  const rlimit none{0, 0};
+  ::setrlimit(RLIMIT_CORE, &none);
   return {};
 }
 

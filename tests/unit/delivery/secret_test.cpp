@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <cstdlib>
@@ -36,7 +36,9 @@ TEST_F(SecretTest, IsReadFromAFileOfItsOwnerAndNoCoreDumpIsLeft) {
   const auto secret = read_secret(write("open sesame\n", 0600));
   ASSERT_TRUE(secret);
   EXPECT_STREQ(secret->reveal(), "open sesame");
-  EXPECT_EQ(::prctl(PR_GET_DUMPABLE), 0);
+  rlimit cores{};
+  ::getrlimit(RLIMIT_CORE, &cores);
+  EXPECT_EQ(cores.rlim_max, 0U);
 }
 
 TEST_F(SecretTest, IsRefusedWhereOthersMayReadOrWriteIt) {
