@@ -6,9 +6,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "daemon/cli/terminal.h"
+#include "daemon/http/console_server.h"
 #include "daemon/service/control_commands.h"
 #include "daemon/service/control_socket.h"
 #include "daemon/service/station_service.h"
@@ -49,6 +51,11 @@ Result<ServiceOptions> service_options(const DaemonOptions& options) {
   // Steps have working folders of their own: no path may depend on where the daemon was started.
   service.config.storage.folder =
       std::filesystem::absolute(service.config.storage.folder).lexically_normal().string();
+  // What is done at the console is written down, with keys that are made at the first start.
+  EvidenceConfig& evidence = service.config.evidence;
+  const std::filesystem::path storage = service.config.storage.folder;
+  evidence.keys_folder = storage / evidence.keys_folder;  // where it was relative
+  if (evidence.audit_log.empty()) evidence.audit_log = storage / "audit.log";
   const auto program = options.step_program.empty()
                            ? skullstation_beside()
                            : std::filesystem::absolute(options.step_program);
@@ -58,6 +65,17 @@ Result<ServiceOptions> service_options(const DaemonOptions& options) {
   service.threads = options.threads;
   service.seed = options.seed;
   return service;
+}
+
+void print_address(const ConsoleServer& console, const std::string& address) {
+  const bool everywhere = address == "0.0.0.0" || address == "::" || address == "127.0.0.1";
+  const bool is_set_up = console.setup_code().empty();
+  fmt::print(stderr, "console: https://{}:{}/\n  certificate's SHA-256: {}\n",
+             everywhere || !is_set_up ? "localhost" : address, console.port(),
+             console.fingerprint());
+  if (is_set_up) return;
+  fmt::print(stderr, "  set-up code: {} (on this machine alone, until there is an account)\n",
+             console.setup_code());
 }
 
 Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
@@ -70,6 +88,13 @@ Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
   const auto control = ControlSocket::open(
       socket, [&service](const std::string& line) { return answer_control(**service, line); });
   if (!control) return forward(control);
+  std::unique_ptr<ConsoleServer> console;
+  if (service_with->config.http.enabled) {
+    auto opened = ConsoleServer::open(**service);
+    if (!opened) return forward(opened);
+    console = *std::move(opened);
+    print_address(*console, service_with->config.http.address);
+  }
   fmt::print(stderr, "station {}: cases in {}\n", service_with->config.station_id,
              service_with->config.storage.folder);
   sd_notify(0, "READY=1");

@@ -1,20 +1,15 @@
 #include "daemon/evidence/station_keys.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/pem.h>
-#include <openssl/rand.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
-#include <array>
 #include <cerrno>
-#include <ctime>
 
 #include "core/file.h"
-#include "core/file_descriptor.h"
 #include "core/staged_folder.h"
 #include "daemon/evidence/openssl_handles.h"
+#include "daemon/evidence/self_signed.h"
 
 namespace skullstation {
 
@@ -32,65 +27,10 @@ int no_passphrase(char*, int, int, void*) { return 0; }
 
 KeyHandle generate_ed25519() { return KeyHandle(EVP_PKEY_Q_keygen(nullptr, nullptr, "ED25519")); }
 
-KeyHandle generate_p256() { return KeyHandle(EVP_PKEY_Q_keygen(nullptr, nullptr, "EC", "P-256")); }
-
-std::string private_pem(const KeyHandle& key) {
-  const BioHandle bio = collecting();
-  PEM_write_bio_PrivateKey(bio.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr);
-  return collected(bio);
-}
-
 std::string public_pem(EVP_PKEY* key) {
   const BioHandle bio = collecting();
   PEM_write_bio_PUBKEY(bio.get(), key);
   return collected(bio);
-}
-
-void add_extension(X509* certificate, int nid, const char* value) {
-  X509V3_CTX context;
-  X509V3_set_ctx_nodb(&context);
-  X509V3_set_ctx(&context, certificate, certificate, nullptr, nullptr, 0);
-  X509_EXTENSION* extension = X509V3_EXT_conf_nid(nullptr, &context, nid, value);
-  X509_add_ext(certificate, extension, -1);
-  X509_EXTENSION_free(extension);
-}
-
-/// A certificate that the key makes for itself; empty if OpenSSL refuses (a name too long).
-std::string self_signed(EVP_PKEY* key, const NewStationKeys& wanted, UtcTime now) {
-  const CertificateHandle certificate(X509_new());
-  X509_set_version(certificate.get(), X509_VERSION_3);
-  std::array<unsigned char, 16> serial{};
-  RAND_bytes(serial.data(), static_cast<int>(serial.size()));
-  serial[0] &= 0x7f;
-  BIGNUM* number = BN_bin2bn(serial.data(), static_cast<int>(serial.size()), nullptr);
-  BN_to_ASN1_INTEGER(number, X509_get_serialNumber(certificate.get()));
-  BN_free(number);
-  const std::time_t from = std::chrono::system_clock::to_time_t(now);
-  ASN1_TIME_adj(X509_getm_notBefore(certificate.get()), from, 0, 0);
-  ASN1_TIME_adj(X509_getm_notAfter(certificate.get()), from, wanted.valid_days, 0);
-  X509_NAME* name = X509_get_subject_name(certificate.get());
-  const auto* text = reinterpret_cast<const unsigned char*>(wanted.station.data());
-  if (X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_UTF8, text,
-                                 static_cast<int>(wanted.station.size()), -1, 0) != 1) {
-    return {};
-  }
-  X509_set_issuer_name(certificate.get(), name);
-  X509_set_pubkey(certificate.get(), key);
-  add_extension(certificate.get(), NID_basic_constraints, "critical,CA:FALSE");
-  add_extension(certificate.get(), NID_key_usage, "critical,digitalSignature,nonRepudiation");
-  add_extension(certificate.get(), NID_subject_key_identifier, "hash");
-  if (X509_sign(certificate.get(), key, EVP_sha256()) == 0) return {};
-  const BioHandle bio = collecting();
-  PEM_write_bio_X509(bio.get(), certificate.get());
-  return collected(bio);
-}
-
-Result<void> write_private(const fs::path& path, const std::string& pem) {
-  const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
-  if (file.get() < 0) return write_error(path, errno);
-  if (const int failure = write_all(file, pem); failure != 0) return write_error(path, failure);
-  if (::fsync(file.get()) != 0) return write_error(path, errno);
-  return {};
 }
 
 /// `kind`: an EVP_PKEY_... number, `name` its name for people.
@@ -132,7 +72,10 @@ Result<void> create_station_keys(const fs::path& folder, const NewStationKeys& w
   if (const auto free = check_new_folder(folder); !free) return forward(free);
   const KeyHandle ed25519 = generate_ed25519();
   const KeyHandle p256 = generate_p256();
-  const std::string certificate = self_signed(p256.get(), wanted, clock.utc_now());
+  const std::string certificate = self_signed_certificate(
+      p256.get(),
+      {wanted.station, wanted.valid_days, "critical,digitalSignature,nonRepudiation", {}},
+      clock.utc_now());
   if (certificate.empty()) {
     return fail(ErrorKind::usage, "--station",
                 fmt::format("no certificate can carry the name \"{}\" ({})", wanted.station,
@@ -143,8 +86,8 @@ Result<void> create_station_keys(const fs::path& folder, const NewStationKeys& w
   if (const auto made = staged.make(); !made) return forward(made);
   ::chmod(staged.path().c_str(), 0700);
   for (const auto& written :
-       {write_private(staged / ed25519_key_file, private_pem(ed25519)),
-        write_private(staged / p256_key_file, private_pem(p256)),
+       {write_private_file(staged / ed25519_key_file, private_pem(ed25519)),
+        write_private_file(staged / p256_key_file, private_pem(p256)),
         write_file_durably(staged / ed25519_public_file, public_pem(ed25519.get())),
         write_file_durably(staged / certificate_file, certificate)}) {
     if (!written) return written;

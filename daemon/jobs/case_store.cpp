@@ -390,6 +390,47 @@ Result<std::vector<Case>> CaseStore::cases_where(const std::string& condition, s
 
 Result<std::vector<Case>> CaseStore::cases() { return cases_where("1", 0); }
 
+Result<FoundCases> CaseStore::find_cases(const CaseSearch& search) {
+  const std::lock_guard lock(mutex_);
+  FoundCases found;
+  {
+    Statement query = database_.statement(
+        "SELECT COUNT(*) FROM cases WHERE instr(lower(number), lower(?)) OR ? = ''");
+    query.bind(search.number).bind(search.number);
+    if (query.next()) found.all = query.integer();
+    if (auto read = query.done(); !read) return forward(read);
+  }
+  std::vector<std::int64_t> ids;
+  Statement query = database_.statement(
+      "SELECT id FROM cases WHERE instr(lower(number), lower(?)) OR ? = '' "
+      "ORDER BY id DESC LIMIT ? OFFSET ?");
+  query.bind(search.number).bind(search.number);
+  query.bind(std::int64_t{search.most}).bind(std::int64_t{search.skipped});
+  while (query.next()) ids.push_back(query.integer());
+  if (auto read = query.done(); !read) return forward(read);
+  for (const std::int64_t id : ids) {
+    auto row = case_of(id);
+    if (!row) return forward(row);
+    found.cases.push_back(*std::move(row));
+  }
+  return found;
+}
+
+Result<std::vector<CaseEvent>> CaseStore::events(std::int64_t case_id) {
+  const std::lock_guard lock(mutex_);
+  std::vector<CaseEvent> found;
+  Statement query =
+      database_.statement("SELECT utc, what FROM events WHERE case_id = ? ORDER BY sequence");
+  query.bind(case_id);
+  while (query.next()) {
+    CaseEvent& event = found.emplace_back();
+    event.time = query.text();
+    event.what = query.text();
+  }
+  if (auto read = query.done(); !read) return forward(read);
+  return found;
+}
+
 Result<Case> CaseStore::case_of(std::int64_t case_id) {
   auto found = cases_where("id = ?", case_id);
   if (!found) return forward(found);

@@ -53,6 +53,24 @@ struct Case {
   CaseState state = CaseState::scanning;
 };
 
+/// Something that happened to a case.
+struct CaseEvent {
+  std::string time;  ///< UTC, ISO 8601
+  std::string what;
+};
+
+/// Which cases, the newest first.
+struct CaseSearch {
+  std::string number;  ///< a part of it, in upper or lower case; empty: any
+  int most = 50;
+  int skipped = 0;
+};
+
+struct FoundCases {
+  std::vector<Case> cases;
+  std::int64_t all = 0;  ///< how many there are, shown or not
+};
+
 /// What a step used and said when it ended.
 struct StepOutcome {
   JobState state = JobState::done;  ///< done, failed or cancelled
@@ -121,7 +139,9 @@ class CaseStore {
   // -- looking ----------------------------------------------------------------------------------
 
   Result<std::vector<Case>> cases();
+  Result<FoundCases> find_cases(const CaseSearch& search);
   Result<Case> case_of(std::int64_t case_id);
+  Result<std::vector<CaseEvent>> events(std::int64_t case_id);
   Result<std::vector<Job>> jobs(std::int64_t case_id);
   Result<Job> job(std::int64_t id);
   Result<std::vector<ArtifactFile>> files(std::int64_t job);

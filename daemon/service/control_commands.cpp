@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "daemon/service/service_json.h"
+
 namespace skullstation {
 
 namespace {
@@ -27,42 +29,11 @@ std::int64_t number_in(const std::string& text) {
   return end.ec == std::errc{} && end.ptr == text.data() + text.size() ? value : -1;
 }
 
-Json status(StationService& service) {
-  const StationStatus now = service.status();
-  Json json = {
-      {"state", to_string(now.state)}, {"signal", to_string(now.signal)}, {"message", now.message}};
-  if (now.scanning) {
-    json["scan"] = {
-        {"case", *now.scanning}, {"fraction", now.scan_fraction}, {"stage", now.scan_stage}};
-  }
-  if (const auto step = service.engine().progress()) {
-    json["job"] = {{"id", step->job},      {"case", step->case_id},
-                   {"step", step->step},   {"fraction", step->fraction},
-                   {"stage", step->stage}, {"seconds", step->seconds}};
-  }
-  if (const std::string trouble = service.engine().trouble(); !trouble.empty()) {
-    json["trouble"] = trouble;
-  }
-  return json;
-}
-
 Json cases(StationService& service) {
   const auto all = service.store().cases();
   if (!all) return failure(all.error().message());
   Json list = Json::array();
-  for (const Case& row : *all) {
-    Json json = {{"id", row.id},
-                 {"number", row.number},
-                 {"created", row.created},
-                 {"state", to_string(row.state)},
-                 {"priority", row.priority}};
-    if (row.hold) json["hold"] = *row.hold;
-    if (row.verified) json["verified"] = *row.verified;
-    if (row.removed) json["removed"] = *row.removed;
-    const auto left = service.engine().time_left(row.id);
-    if (row.state == CaseState::building && left && *left) json["seconds_left"] = (*left)->count();
-    list.push_back(json);
-  }
+  for (const Case& row : *all) list.push_back(case_json(service, row));
   return {{"cases", list}};
 }
 
@@ -70,18 +41,7 @@ Json jobs(StationService& service, std::int64_t case_id) {
   const auto all = service.store().jobs(case_id);
   if (!all) return failure(all.error().message());
   Json list = Json::array();
-  for (const Job& job : *all) {
-    list.push_back({{"id", job.id},
-                    {"step", job.step},
-                    {"state", to_string(job.state)},
-                    {"options", Json::parse(job.options, nullptr, false)},
-                    {"interruptions", job.interruptions},
-                    {"seconds", job.seconds},
-                    {"cpu_seconds", job.cpu_seconds},
-                    {"peak_mib", job.peak_mib},
-                    {"version", job.version},
-                    {"error", job.error}});
-  }
+  for (const Job& job : *all) list.push_back(job_json(job));
   return {{"jobs", list}};
 }
 
@@ -101,7 +61,7 @@ Json files(StationService& service, std::int64_t job) {
 Json answer(StationService& service, const std::string& word, const std::string& rest) {
   const std::int64_t id = number_in(rest);
   CaseStore& store = service.store();
-  if (word == "status") return status(service);
+  if (word == "status") return status_json(service);
   if (word == "cases") return cases(service);
   if (word == "jobs") return jobs(service, id);
   if (word == "files") return files(service, id);

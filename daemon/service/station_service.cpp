@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <iterator>
 #include <utility>
 
 #include "core/file.h"
@@ -67,18 +68,34 @@ StationService::~StationService() {
   scan_stop_.request_stop();
 }
 
-void StationService::tell(StationEvent event) {
+void StationService::tell(StationEvent event, std::optional<StationState> only_in) {
   {
     const std::lock_guard lock(mutex_);
-    events_.push_back(event);
+    events_.push_back({event, only_in});
   }
   changed_.notify_all();
 }
 
 void StationService::say(std::string message) {
-  fmt::print(stderr, "{}\n", message);
+  log(message);
   const std::lock_guard lock(mutex_);
   status_.message = std::move(message);
+}
+
+void StationService::log(std::string words) {
+  constexpr std::size_t kept = 500;
+  fmt::print(stderr, "{}\n", words);
+  const std::lock_guard lock(mutex_);
+  log_.push_back({++logged_, to_iso8601(clock_.utc_now()), std::move(words)});
+  if (log_.size() > kept) log_.pop_front();
+}
+
+std::vector<LogLine> StationService::log_after(std::uint64_t number) const {
+  const std::lock_guard lock(mutex_);
+  std::vector<LogLine> lines;
+  std::ranges::copy_if(log_, std::back_inserter(lines),
+                       [&](const LogLine& line) { return line.number > number; });
+  return lines;
 }
 
 StationStatus StationService::status() const {
@@ -101,6 +118,25 @@ SimulatedStation* StationService::simulated() const {
   return open == nullptr || !open->room ? nullptr : &open->room->station();
 }
 
+Result<CameraPreview> StationService::preview(const std::string& camera) {
+  return previews_.look(camera, station(), options_.config, cameras_mutex_, clock_);
+}
+
+std::vector<Finding> StationService::check() {
+  Findings findings;
+  check_machine(options_.config, store_->folder(), findings);
+  const std::unique_lock lock(cameras_mutex_, std::try_to_lock);
+  const Station* open = station();
+  if (open == nullptr) {
+    findings.warn("station", "is not open", status().message);
+  } else if (!lock) {
+    findings.warn("cameras", "are at work and were not looked at", "look again after the scan");
+  } else {
+    check_parts(options_.config, *open, findings);
+  }
+  return findings.list;
+}
+
 void StationService::run(const std::stop_token& stop, const std::function<void()>& alive) {
   act(StationAction::open);
   auto next_removal = clock_.now();
@@ -110,12 +146,12 @@ void StationService::run(const std::stop_token& stop, const std::function<void()
       remove_expired();
       next_removal = clock_.now() + 1h;
     }
-    std::optional<StationEvent> event;
+    std::optional<ToldEvent> event;
     {
       std::unique_lock lock(mutex_);
       changed_.wait_for(lock, stop, 500ms, [this] { return !events_.empty(); });
       if (stop.stop_requested()) {
-        event = StationEvent::shut_down;
+        event = ToldEvent{StationEvent::shut_down, std::nullopt};
       } else if (!events_.empty()) {
         event = events_.front();
         events_.pop_front();
@@ -126,11 +162,14 @@ void StationService::run(const std::stop_token& stop, const std::function<void()
   if (worker_.joinable()) worker_.join();
 }
 
-void StationService::walk(StationEvent event) {
-  const Transition* transition = find_transition(status().state, event);
+void StationService::walk(const ToldEvent& told) {
+  const StationState state = status().state;
+  const StationEvent event = told.event;
+  if (told.only_in && *told.only_in != state) return;
+  const Transition* transition = find_transition(state, event);
   if (transition == nullptr) return;
-  fmt::print(stderr, "{}: {} -> {}\n", to_string(event), to_string(transition->from),
-             to_string(transition->to));
+  log(fmt::format("{}: {} -> {}", to_string(event), to_string(transition->from),
+                  to_string(transition->to)));
   {
     const std::lock_guard lock(mutex_);
     status_.state = transition->to;
@@ -148,7 +187,7 @@ void StationService::walk(StationEvent event) {
   }
   if (Station* open = station()) {
     if (const auto shown = open->hardware.lamp->show(transition->signal); !shown) {
-      fmt::print(stderr, "{}\n", shown.error().message());
+      log(shown.error().message());
     }
   }
   act(transition->action);
@@ -371,7 +410,7 @@ void StationService::watch_button(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const auto press = station_->hardware.button->wait_for_press(1s, stop);
     if (!press) {
-      fmt::print(stderr, "button: {}\n", press.error().message());
+      log("button: " + press.error().message());
       sleep_for(1s, stop);
     } else if (*press) {
       tell(**press == Press::brief ? StationEvent::go : StationEvent::cancel);
@@ -416,9 +455,9 @@ void StationService::remove_expired() {
   if (days == 0) return;
   const auto removed = store_->remove_expired(std::chrono::days(days));
   if (!removed) {
-    fmt::print(stderr, "{}\n", removed.error().message());
+    log(removed.error().message());
   } else if (!removed->empty()) {
-    fmt::print(stderr, "{} cases were deleted: delivered, verified, expired\n", removed->size());
+    log(fmt::format("{} cases were deleted: delivered, verified, expired", removed->size()));
   }
 }
 

@@ -17,8 +17,10 @@
 #include "core/result.h"
 #include "daemon/jobs/case_store.h"
 #include "daemon/jobs/job_engine.h"
+#include "daemon/service/camera_preview.h"
 #include "daemon/station/state_table.h"
 #include "daemon/station/station.h"
+#include "daemon/station/station_check.h"
 #include "daemon/station/station_config.h"
 
 namespace skullstation {
@@ -41,6 +43,13 @@ struct StationStatus {
   std::string scan_stage;
 };
 
+/// Something that happened at the station, in words.
+struct LogLine {
+  std::uint64_t number = 0;  ///< counts from 1 since the start
+  std::string time;          ///< UTC, ISO 8601
+  std::string words;
+};
+
 /// The running station: looks every event up in the state table (daemon/station/state_table.h) and
 /// carries out the action. Events come from the button, the interlock, cameras, scan and jobs on
 /// threads of their own; the table is walked on one.
@@ -54,20 +63,40 @@ class StationService {
   void run(const std::stop_token& stop, const std::function<void()>& alive);
 
   /// Safe from any thread; what means nothing in the present state does nothing.
-  void tell(StationEvent event);
+  void tell(StationEvent event) { tell(event, std::nullopt); }
+  /// The same if the station is in this state when the event's turn comes: what a person saw on a
+  /// screen may be over, and "go" must not mean something else by then.
+  void tell(StationEvent event, std::optional<StationState> only_in);
   /// Of the next scan; without one it is made of the date and a running number.
   void set_case_number(std::string number);
   StationStatus status() const;
+  /// The lines after this number; of older ones than the last 500 nothing is known.
+  std::vector<LogLine> log_after(std::uint64_t number) const;
+  /// What a camera sees now or, while it is at work, saw last. Errors: usage (no such camera),
+  /// hardware (not open, at work and never looked through, failed).
+  Result<CameraPreview> preview(const std::string& camera);
+  /// The computer and the open station, as `skullstation doctor` sees them.
+  std::vector<Finding> check();
 
   CaseStore& store() { return *store_; }
   JobEngine& engine() { return *engine_; }
+  const StepChain& chain() const { return chain_; }
+  const StationConfig& config() const { return options_.config; }
+  const std::string& version() const { return options_.version; }
+  const Clock& clock() const { return clock_; }
   /// The hands at a simulated station; null at a real one, or while it is not open.
   SimulatedStation* simulated() const;
 
  private:
   explicit StationService(const ServiceOptions& options) : options_(options) {}
 
-  void walk(StationEvent event);
+  /// An event, and the only state in which it counts, if it was told so.
+  struct ToldEvent {
+    StationEvent event;
+    std::optional<StationState> only_in;
+  };
+
+  void walk(const ToldEvent& told);
   void act(StationAction action);
   void open_parts(bool reset);
   Result<bool> scan_to_resume();
@@ -78,6 +107,7 @@ class StationService {
   void watch_cameras(const std::stop_token& stop);
   void remove_expired();
   void say(std::string message);
+  void log(std::string words);
   Station* station() const;
   /// Runs the work after the one before it has ended.
   void work(std::function<void()> task);
@@ -89,7 +119,9 @@ class StationService {
 
   mutable std::mutex mutex_;  // guards what follows, up to the threads
   std::condition_variable_any changed_;
-  std::deque<StationEvent> events_;
+  std::deque<ToldEvent> events_;
+  std::deque<LogLine> log_;
+  std::uint64_t logged_ = 0;
   StationStatus status_;
   std::string next_number_;
   std::unique_ptr<Station> station_;  // set once; its parts are safe for their own threads
@@ -98,7 +130,8 @@ class StationService {
   std::stop_source scan_stop_;
 
   std::mutex cameras_mutex_;  // held by whoever takes pictures
-  std::jthread worker_;       // opens the station, scans
+  CameraPreviews previews_;
+  std::jthread worker_;  // opens the station, scans
   std::jthread button_;
   std::jthread cameras_;
   std::unique_ptr<JobEngine> engine_;  // last: it tells this object

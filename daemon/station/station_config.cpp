@@ -201,6 +201,14 @@ std::vector<Error> invalid_values(const StationConfig& config) {
   if (config.storage.keep_days < 0) complain("storage.keep_days", "must be 0 or more");
   if (config.jobs.memory_mib < 256) complain("jobs.memory_mib", "must be at least 256");
   if (config.jobs.time_limit_min < 1) complain("jobs.time_limit_min", "must be at least 1");
+  const HttpConfig& http = config.http;
+  if (http.port < 0 || http.port > 65535) complain("http.port", "must be 0 to 65535");
+  if (http.idle_min < 1) complain("http.idle_min", "must be at least 1");
+  if (http.sign_in_hours < 1) complain("http.sign_in_hours", "must be at least 1");
+  if (http.certificate.empty() != http.key.empty()) {
+    complain("http.certificate", "and http.key come together",
+             "name both files, or neither for the station's own certificate");
+  }
   if (config.scan.passes < 1 || config.scan.passes > 3) complain("scan.passes", "must be 1 to 3");
   if (config.scan.jpeg_quality < 1 || config.scan.jpeg_quality > 100) {
     complain("scan.jpeg_quality", "must be 1 to 100");
@@ -263,6 +271,15 @@ void visit_config(StationConfig& config, ConfigFields& fields) {
                  "of skullstationd's models");
     fields.field("memory_mib", config.jobs.memory_mib, "that a step may use");
     fields.field("time_limit_min", config.jobs.time_limit_min, "after which a step is ended");
+  });
+  fields.table("http", [&] {
+    fields.field("enabled", config.http.enabled, "skullstationd shows its console");
+    fields.field("address", config.http.address, "127.0.0.1: this machine alone; 0.0.0.0: network");
+    fields.field("port", config.http.port, "of the console; 0: a free one");
+    fields.field("certificate", config.http.certificate, "PEM file; empty: the station's own");
+    fields.field("key", config.http.key, "PEM file of the certificate's key");
+    fields.field("idle_min", config.http.idle_min, "without a request, until a sign-in ends");
+    fields.field("sign_in_hours", config.http.sign_in_hours, "until a sign-in ends in any case");
   });
 }
 

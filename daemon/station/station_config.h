@@ -78,6 +78,18 @@ struct StorageConfig {
   int keep_days = 0;
 };
 
+/// Where and how skullstationd shows its console.
+struct HttpConfig {
+  bool enabled = true;
+  /// 127.0.0.1: this machine alone; 0.0.0.0: the network. Before set-up always this machine alone.
+  std::string address = "127.0.0.1";
+  int port = 8443;          ///< 0: a free one
+  std::string certificate;  ///< PEM, the chain; empty: the station's own
+  std::string key;          ///< PEM
+  int idle_min = 60;        ///< a sign-in ends after so long without a request
+  int sign_in_hours = 12;   ///< and after so long in any case
+};
+
 enum class JobQuality { draft, standard, fine };
 
 /// How skullstationd makes models and faces of scans.
@@ -108,6 +120,7 @@ struct StationConfig {
   EvidenceConfig evidence;
   StorageConfig storage;
   JobsConfig jobs;
+  HttpConfig http;
 
   static std::vector<CameraConfig> simulated_pair();
 };

@@ -56,7 +56,8 @@ class Daemon : public ::testing::Test {
     small.camera = camera;
     small.extra =
         "[turntable]\nsteps_per_turn = 200\nmax_speed_deg_s = 1000\n"
-        "max_acceleration_deg_s2 = 20000\nmax_jerk_deg_s3 = 2000000\nhome_speed_deg_s = 700\n";
+        "max_acceleration_deg_s2 = 20000\nmax_jerk_deg_s3 = 2000000\nhome_speed_deg_s = 700\n"
+        "[http]\nenabled = false\n";
     config_ = write_small_station(folder_.path(), small);
     auto text = *read_file(config_);
     text.insert(text.find("[scan]\n") + 7, "settle_ms = 0\n");
