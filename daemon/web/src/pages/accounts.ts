@@ -62,7 +62,7 @@ export function accountsPage(place: HTMLElement, who: SignIn): () => void {
   fill(
     place,
     h("h1", {}, t("accounts.title")),
-    maySee && h("section", { class: "card" }, said.place, h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, head.map((k) => h("th", { scope: "col" }, k)))), rows))),
+    maySee && h("section", { class: "card" }, said.place, h("div", { class: "scroll", tabindex: 0 }, h("table", {}, h("thead", {}, h("tr", {}, head.map((k) => h("th", { scope: "col" }, k)))), rows))),
     mayChange && addForm(),
     ownPassword(),
   );

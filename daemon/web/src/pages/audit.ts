@@ -26,7 +26,7 @@ export function auditPage(place: HTMLElement): () => void {
   fill(
     place,
     h("h1", {}, t("audit.title")),
-    h("section", { class: "card" }, h("button", { onclick: () => void check().catch(said.bad) }, t("audit.check")), h("p", {}), said.place, h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, head.map((k) => h("th", { scope: "col" }, k)))), rows))),
+    h("section", { class: "card" }, h("button", { onclick: () => void check().catch(said.bad) }, t("audit.check")), h("p", {}), said.place, h("div", { class: "scroll", tabindex: 0 }, h("table", {}, h("thead", {}, h("tr", {}, head.map((k) => h("th", { scope: "col" }, k)))), rows))),
   );
   get<{ entries: AuditEntry[] }>("/audit").then(
     ({ entries }) => fill(rows, entries.map((e) => h("tr", {}, h("td", {}, moment(e.time)), h("td", {}, e.who), h("td", {}, e.what), h("td", {}, e.case), h("td", { class: "soft" }, details(e))))),

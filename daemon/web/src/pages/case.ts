@@ -97,7 +97,7 @@ function rerunPart(whole: WholeCase, again: () => void): HTMLElement {
 function landmarksPart(figures: CaseFigures): HTMLElement {
   const head = h("tr", {}, h("th", { scope: "col" }, t("result.landmark")), ["result.depth", "result.sd", "result.model_mean"].map((k) => h("th", { scope: "col", class: "number" }, t(k as "result.depth"))));
   const rows = (figures.tissue ?? []).map((l) => h("tr", {}, h("th", { scope: "row" }, l.name), [l.depth_mm, l.sd_mm, l.model_mean_mm].map((v) => h("td", { class: "number" }, number(v, 1)))));
-  return h("details", { class: "card" }, h("summary", {}, t("result.landmarks")), h("div", { class: "scroll" }, h("table", {}, h("thead", {}, head), h("tbody", {}, rows))));
+  return h("details", { class: "card" }, h("summary", {}, t("result.landmarks")), h("div", { class: "scroll", tabindex: 0 }, h("table", {}, h("thead", {}, head), h("tbody", {}, rows))));
 }
 
 export function casePage(place: HTMLElement, who: SignIn, argument: string): () => void {

@@ -40,7 +40,7 @@ export function casesPage(place: HTMLElement): () => void {
   fill(
     place,
     h("h1", {}, t("cases.title")),
-    h("div", { class: "card" }, field(t("cases.search"), search), count, said.place, h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, head.map((k) => h("th", { scope: "col" }, t(k))))), rows)), h("p", {}), h("div", { class: "row" }, newer, older)),
+    h("div", { class: "card" }, field(t("cases.search"), search), count, said.place, h("div", { class: "scroll", tabindex: 0 }, h("table", {}, h("thead", {}, h("tr", {}, head.map((k) => h("th", { scope: "col" }, t(k))))), rows)), h("p", {}), h("div", { class: "row" }, newer, older)),
   );
   void look().catch(said.bad);
   const timer = window.setInterval(() => void look().catch(said.bad), 15000);

@@ -23,14 +23,14 @@ export function checkPage(place: HTMLElement): () => void {
       said.clear();
       fill(
         rows,
-        check.findings.map((f) => h("tr", {}, h("td", {}, tag("check", f.verdict)), h("td", {}, f.topic), h("td", {}, f.what, f.advice && h("div", { class: "soft" }, f.advice)))),
+        check.findings.map((f) => h("tr", {}, h("td", {}, tag("check", f.verdict)), h("td", { lang: "en" }, f.topic), h("td", { lang: "en" }, f.what, f.advice && h("div", { class: "soft" }, f.advice)))),
       );
       const fact = (name: string, value: string) => [h("dt", {}, h("strong", {}, name)), h("dd", {}, value)];
       fill(
         facts,
         fact(t("check.version"), live.station?.version ?? ""),
         check.free_bytes !== undefined ? fact(t("check.space"), bytes(check.free_bytes)) : null,
-        fact(t("check.certificate"), check.certificate_sha256.match(/.{1,24}/g)?.join(" ") ?? ""),
+        fact(t("check.certificate"), check.certificate_sha256),
       );
     } catch (error) {
       said.bad(error);
@@ -41,7 +41,7 @@ export function checkPage(place: HTMLElement): () => void {
   fill(
     place,
     h("h1", {}, `${t("check.title")} ${live.station?.station ?? ""}`),
-    h("section", { class: "card" }, h("h2", {}, t("check.findings")), said.place, h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, head.map((k) => h("th", { scope: "col" }, t(k))))), rows)), h("p", {}), again),
+    h("section", { class: "card" }, h("h2", {}, t("check.findings")), said.place, h("div", { class: "scroll", tabindex: 0 }, h("table", {}, h("thead", {}, h("tr", {}, head.map((k) => h("th", { scope: "col" }, t(k))))), rows)), h("p", {}), again),
     h("section", { class: "card" }, facts),
   );
   void look();

@@ -73,7 +73,8 @@ function previewPart(station: Station): Part {
   }
   async function keepLooking(): Promise<void> {
     while (!ended) {
-      await look().catch((error) => ended || fill(verdict, h("p", { class: "soft" }, words(error))));
+      // The camera is busy now and then: the last picture stays.
+      await look().catch((error) => ended || address || fill(verdict, h("p", { class: "soft", lang: "en" }, words(error))));
       await new Promise((resolve) => setTimeout(resolve, 1000));
     }
   }
@@ -189,7 +190,7 @@ export function tablePage(place: HTMLElement, who: SignIn): () => void {
       parts = [left, startPart(station, who), casesPart()];
       const hands = station.simulated && ["operator", "examiner", "administrator"].includes(who.role);
       fill(body, h("div", {}, left.element), h("div", {}, parts[1].element, parts[2].element, hands && handsPart()));
-      (body.querySelector("[autofocus]") as HTMLElement | null)?.focus();
+      (body.querySelector("[autofocus]") as HTMLElement | null)?.focus({ preventScroll: true });
     }
     const instructionNow = `${station.state} ${station.message}`;
     if (state.dataset.of !== instructionNow) {
