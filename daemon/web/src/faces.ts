@@ -153,7 +153,7 @@ export function facesPart(face: Job, skull: Job | undefined, files: ArtifactFile
 
   const layout = h(
     "select",
-    { onchange: () => viewer.arrange(layout.value === "side") },
+    { onchange: () => (viewer.arrange(layout.value === "side"), viewer.look("front")) },
     h("option", { value: "side" }, t("result.side")),
     h("option", { value: "over" }, t("result.over")),
   );
