@@ -127,15 +127,16 @@ Response answer_page(const Request& request) {
   const bool small = request.header("accept-encoding").find("gzip") != std::string::npos;
   Response page;
   const std::string tag = fmt::format("\"{}{}\"", asset->sha256, small ? "-gzip" : "");
-  page.headers = {{"Content-Type", std::string(asset->content_type)},
-                  {"ETag", tag},
-                  {"Vary", "Accept-Encoding"},
-                  // Looked for again at every start: after an update nobody sees the old pages.
-                  {"Cache-Control", "no-cache"},
-                  {"Content-Security-Policy",
-                   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: "
-                   "data:; connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action "
-                   "'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"}};
+  page.headers = {
+      {"Content-Type", std::string(asset->content_type)},
+      {"ETag", tag},
+      {"Vary", "Accept-Encoding"},
+      // Looked for again at every start: after an update nobody sees the old pages.
+      {"Cache-Control", "no-cache"},
+      {"Content-Security-Policy",
+       "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: "
+       "data:; connect-src 'self' blob:; frame-src 'self'; base-uri 'none'; form-action "
+       "'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"}};
   if (request.header("if-none-match") == tag) {
     page.status = 304;
     return page;
