@@ -99,8 +99,8 @@ std::string Request::header(const std::string& name) const {
   return found == headers.end() ? std::string{} : found->second;
 }
 
-Result<Target> parse_target(std::string_view target) {
-  Target parsed;
+Result<RequestTarget> parse_target(std::string_view target) {
+  RequestTarget parsed;
   const std::size_t question = target.find('?');
   // Checked before it is decoded as well: "%2e%2e" is as little wanted as "..".
   auto path = decoded(target.substr(0, question), false);

@@ -45,14 +45,14 @@ struct Response {
 };
 
 /// What the first line of a request names.
-struct Target {
+struct RequestTarget {
   std::string path;
   std::map<std::string, std::string> query;
 };
 
 /// Errors (bad_input): not UTF-8, control characters, a percent sign without two digits, a path
 /// that does not begin with '/' or has a part ".", ".." or none between two slashes.
-Result<Target> parse_target(std::string_view target);
+Result<RequestTarget> parse_target(std::string_view target);
 
 /// The value of the cookie, or empty.
 std::string cookie_of(const Request& request, std::string_view name);
