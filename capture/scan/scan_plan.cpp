@@ -32,7 +32,7 @@ Result<void> ScanPlan::validate() const {
 }
 
 std::vector<ScanStop> stops_of_pass(const ScanPlan& plan, int pass) {
-  const char* extension = plan.image_format == ImageFormat::png ? "png" : "jpg";
+  const char* extension = plan.image_format == PhotographFormat::png ? "png" : "jpg";
   std::vector<PlannedView> views;
   for (int ring = 0; ring < static_cast<int>(plan.rings.size()); ++ring) {
     const int count = plan.rings[static_cast<std::size_t>(ring)].views;

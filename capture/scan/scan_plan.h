@@ -8,14 +8,14 @@
 
 namespace skullstation {
 
-enum class ImageFormat { png, jpeg };
+enum class PhotographFormat { png, jpeg };
 
 /// What a scan photographs, as pure data: one ring of views per camera, each ring once in every
 /// pass. Cameras at different heights are different rings; a higher ring may do with fewer views.
 struct ScanPlan {
   std::vector<SessionPlan::Ring> rings;
   int passes = 2;  ///< placements of the specimen: upright, turned over
-  ImageFormat image_format = ImageFormat::png;
+  PhotographFormat image_format = PhotographFormat::png;
   int jpeg_quality = 95;  ///< 1..100
 
   Result<void> validate() const;

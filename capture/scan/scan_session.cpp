@@ -52,12 +52,12 @@ FrameSize size_of(const Image8& image) { return {image.width, image.height, imag
 
 /// A size that no file of this image exceeds (but for JPEG of pure noise): PNG stores what it
 /// can't compress. The rest is EXIF and the session file, twice, as it is rewritten.
-std::uint64_t bytes_bound(const FrameSize& size, ImageFormat format) {
+std::uint64_t bytes_bound(const FrameSize& size, PhotographFormat format) {
   const auto raw = static_cast<std::uint64_t>(size.width) *
                    static_cast<std::uint64_t>(size.height) *
                    static_cast<std::uint64_t>(size.channels);
   constexpr std::uint64_t metadata = 64 * 1024;
-  return (format == ImageFormat::png ? raw + raw / 100 : raw / 2) + metadata;
+  return (format == PhotographFormat::png ? raw + raw / 100 : raw / 2) + metadata;
 }
 
 class Scan {
@@ -261,7 +261,7 @@ Result<void> Scan::record(const PlannedView& planned, const ScanCamera& camera, 
   metadata.focal_length_mm = camera.focal_length_mm;
   if (camera.lens) metadata.focal_length_35mm = camera.lens->fx / camera.lens->width * 36.0;
   const Result<std::string> file =
-      with_metadata(options_.plan.image_format == ImageFormat::png
+      with_metadata(options_.plan.image_format == PhotographFormat::png
                         ? encode_png(frame.image)
                         : encode_jpeg(frame.image, options_.plan.jpeg_quality),
                     metadata);

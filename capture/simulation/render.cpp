@@ -188,7 +188,7 @@ ViewTruth render_truth(const PlacedScene& scene, const PreparedOptics& optics,
   ViewTruth truth{ImageF(lens.width, lens.height, 1), Image8(lens.width, lens.height, 1)};
   parallel_for(lens.height, threads, [&](int y) {
     std::vector<SpecimenRay> rays;
-    std::vector<SurfacePoint> points;
+    std::vector<ShadingPoint> points;
     for (int x = 0; x < lens.width; ++x) {
       const Eigen::Vector3d along = optics.ray(x + 0.5, y + 0.5).homogeneous();
       SightRay ray;

@@ -59,7 +59,7 @@ Vector3d to_board(const PlacedScene& scene, const Vector3d& x_table) {
   return scene.board_rotation_table * (x_table - scene.table_from_board.translation);
 }
 
-void hit_board(const PlacedScene& scene, const SightRay& ray, SurfacePoint& nearest) {
+void hit_board(const PlacedScene& scene, const SightRay& ray, ShadingPoint& nearest) {
   const SceneOptions& options = scene.parts->options;
   const Eigen::Vector2d half = half_plate(options);
   const Vector3d direction = scene.board_rotation_table * ray.direction;
@@ -75,7 +75,7 @@ void hit_board(const PlacedScene& scene, const SightRay& ray, SurfacePoint& near
 }
 
 /// A cylinder around the axis; its top is seen from above, its side from everywhere.
-void hit_platter(const SceneOptions& options, const SightRay& ray, SurfacePoint& nearest) {
+void hit_platter(const SceneOptions& options, const SightRay& ray, ShadingPoint& nearest) {
   const double top = options.board ? -options.board_thickness_mm : 0.0;
   const double radius2 = options.platter_radius_mm * options.platter_radius_mm;
   if (ray.direction.z() < 0.0 && ray.origin.z() > top) {
@@ -122,7 +122,7 @@ Vector3f backdrop_radiance(const Backdrop& backdrop, const SightRay& ray, double
   return backdrop.radiance(origin + distance * direction);
 }
 
-Vector3f board_albedo(const PlacedScene& scene, const SightRay& ray, const SurfacePoint& point) {
+Vector3f board_albedo(const PlacedScene& scene, const SightRay& ray, const ShadingPoint& point) {
   const Vector3d normal = scene.board_rotation_table * point.flat_normal;
   if (normal.z() < 0.5) return Vector3f::Constant(0.35F);  // the plate's sides and back
   // How the point moves on the plane over the width of the filter.
@@ -143,7 +143,7 @@ Vector3f board_albedo(const PlacedScene& scene, const SightRay& ray, const Surfa
   return Vector3f::Constant(ink_albedo + white * (paper_albedo - ink_albedo));
 }
 
-Vector3f platter_albedo(const SurfacePoint& point, float footprint_mm) {
+Vector3f platter_albedo(const ShadingPoint& point, float footprint_mm) {
   const Vector3f x = point.x_table.cast<float>();
   const float grain = 0.10F * gradient_noise(x / 30.0F, 21U) +
                       0.25F * visible_share(1.2F, footprint_mm) * gradient_noise(x / 0.8F, 22U);
@@ -152,9 +152,9 @@ Vector3f platter_albedo(const SurfacePoint& point, float footprint_mm) {
 
 }  // namespace
 
-SurfacePoint hit_table(const PlacedScene& scene, const SightRay& ray) {
+ShadingPoint hit_table(const PlacedScene& scene, const SightRay& ray) {
   const SceneOptions& options = scene.parts->options;
-  SurfacePoint nearest;
+  ShadingPoint nearest;
   nearest.distance_mm = std::numeric_limits<double>::infinity();
   if (options.platter) hit_platter(options, ray, nearest);
   if (options.board) hit_board(scene, ray, nearest);
@@ -166,7 +166,7 @@ SurfacePoint hit_table(const PlacedScene& scene, const SightRay& ray) {
 }
 
 void color_table(const PlacedScene& scene, const SightRay& ray, double cos_table, double sin_table,
-                 SurfacePoint& point) {
+                 ShadingPoint& point) {
   if (point.object == SceneObject::backdrop) {
     point.albedo = backdrop_radiance(scene.parts->backdrop, ray, cos_table, sin_table);
     return;
@@ -183,7 +183,7 @@ void color_table(const PlacedScene& scene, const SightRay& ray, double cos_table
   point.ambient = light * point.albedo;
 }
 
-SurfacePoint specimen_point(const PlacedScene& scene,
+ShadingPoint specimen_point(const PlacedScene& scene,
                             const Eigen::Matrix3d& table_rotation_specimen, const SightRay& ray,
                             const SpecimenHit& hit) {
   const SceneParts& parts = *scene.parts;
@@ -220,7 +220,7 @@ SurfacePoint specimen_point(const PlacedScene& scene,
     smooth += weights[i] * (x_specimen - height * corner_normals[i]);
   }
 
-  SurfacePoint point;
+  ShadingPoint point;
   const Vector3d ray_direction = table_rotation_specimen.transpose() * ray.direction;
   // A surface seen from behind (an open mesh) is lit on the side that is seen.
   if (flat.dot(ray_direction) > 0.0) {

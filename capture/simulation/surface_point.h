@@ -16,7 +16,7 @@ struct SightRay {
 };
 
 /// Where a ray ends.
-struct SurfacePoint {
+struct ShadingPoint {
   SceneObject object = SceneObject::backdrop;
   double distance_mm = 0.0;
   Eigen::Vector3d x_table;
@@ -31,15 +31,15 @@ struct SurfacePoint {
 
 /// What the ray hits of the platter and the board, its place, normals and object; the backdrop if
 /// nothing.
-SurfacePoint hit_table(const PlacedScene& scene, const SightRay& ray);
+ShadingPoint hit_table(const PlacedScene& scene, const SightRay& ray);
 
 /// Adds colour and ambient light to a hit on platter, board or backdrop. The backdrop stands still
 /// while the table turns, by the angle of the given cosine and sine.
 void color_table(const PlacedScene& scene, const SightRay& ray, double cos_table, double sin_table,
-                 SurfacePoint& point);
+                 ShadingPoint& point);
 
 /// The point for a hit on the specimen. \pre hit.triangle >= 0
-SurfacePoint specimen_point(const PlacedScene& scene,
+ShadingPoint specimen_point(const PlacedScene& scene,
                             const Eigen::Matrix3d& table_rotation_specimen, const SightRay& ray,
                             const SpecimenHit& hit);
 

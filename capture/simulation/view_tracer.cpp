@@ -118,7 +118,7 @@ ViewTracer::Sight ViewTracer::sight(const PixelSample& sample) const {
   return sight;
 }
 
-void ViewTracer::add_lamps(const SurfacePoint& point, const Sight& sight, const PixelSample& sample,
+void ViewTracer::add_lamps(const ShadingPoint& point, const Sight& sight, const PixelSample& sample,
                            std::size_t sample_number, bool lamps_in_turn, TracedSample& traced) {
   const int groups = lamps_in_turn ? 2 : 1;
   const auto to_table = [&](const Vector3d& v) {
@@ -186,7 +186,7 @@ void ViewTracer::trace(std::span<const PixelSample> samples, bool lamps_in_turn,
   if (specimen) scene_.parts->surface->intersect(rays_, hits_);
 
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    SurfacePoint& point = points_[i];
+    ShadingPoint& point = points_[i];
     if (specimen && hits_[i].triangle >= 0) {
       point = specimen_point(scene_, table_rotation_specimen_, sights_[i].ray, hits_[i]);
     } else {

@@ -53,7 +53,7 @@ class ViewTracer {
   };
   Sight sight(const PixelSample& sample) const;
   double table_angle_deg(double time) const;
-  void add_lamps(const SurfacePoint& point, const Sight& sight, const PixelSample& sample,
+  void add_lamps(const ShadingPoint& point, const Sight& sight, const PixelSample& sample,
                  std::size_t sample_number, bool lamps_in_turn, TracedSample& traced);
 
   const PlacedScene& scene_;
@@ -78,7 +78,7 @@ class ViewTracer {
     std::uint8_t lamp_bit;
   };
   std::vector<Sight> sights_;
-  std::vector<SurfacePoint> points_;
+  std::vector<ShadingPoint> points_;
   std::vector<SpecimenRay> rays_;
   std::vector<SpecimenHit> hits_;
   std::vector<SpecimenRay> shadow_rays_;

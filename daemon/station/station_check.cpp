@@ -34,7 +34,7 @@ void check_space(const StationConfig& config, const std::filesystem::path& cases
   double scan_bytes = 0.0;
   for (const CameraConfig& camera : config.cameras) {
     // PNG of a photograph: about 60 % of the raw RGB; JPEG at high quality: about 15 %.
-    const double share = config.scan.image_format == ImageFormat::png ? 0.6 : 0.15;
+    const double share = config.scan.image_format == PhotographFormat::png ? 0.6 : 0.15;
     scan_bytes += share * 3.0 * camera.width * camera.height * config.scan.views_per_ring *
                   config.scan.passes;
   }

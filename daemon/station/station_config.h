@@ -53,7 +53,7 @@ struct CameraConfig {
 struct ScanConfig {
   int passes = 2;
   int views_per_ring = 24;
-  ImageFormat image_format = ImageFormat::png;
+  PhotographFormat image_format = PhotographFormat::png;
   int jpeg_quality = 95;
   std::chrono::milliseconds settle_time{800};
   std::chrono::milliseconds frame_timeout{5000};

@@ -19,7 +19,7 @@ Result<double> conformal_factor(std::span<const double> ratios, double level) {
   return *at;
 }
 
-Coverage coverage_of(std::span<const double> ratios, double factor) {
+BandCoverage coverage_of(std::span<const double> ratios, double factor) {
   const auto n = static_cast<double>(ratios.size());
   const auto inside = static_cast<double>(
       std::ranges::count_if(ratios, [&](double ratio) { return ratio <= factor; }));

@@ -23,11 +23,11 @@ struct BandFactor {
 Result<double> conformal_factor(std::span<const double> ratios, double level);
 
 /// Share of |error| <= factor SD, with its 95 % confidence interval (Wilson 1927).
-struct Coverage {
+struct BandCoverage {
   double share = 0.0;
   double low = 0.0;
   double high = 1.0;
 };
-Coverage coverage_of(std::span<const double> ratios, double factor);
+BandCoverage coverage_of(std::span<const double> ratios, double factor);
 
 }  // namespace skullstation

@@ -239,7 +239,7 @@ TEST(Resume, AnotherPlanIsRefusedAndTheDifferenceNamed) {
        "the number of passes was \"2\" and now is \"1\""},
       {[](TestBench& b) { b.options.plan.rings[0].views = 8; },
        "the rings was \"cam0 (4 views), cam1 (2 views)\" and now is \"cam0 (8 views), cam1"},
-      {[](TestBench& b) { b.options.plan.image_format = ImageFormat::jpeg; },
+      {[](TestBench& b) { b.options.plan.image_format = PhotographFormat::jpeg; },
        "\"images/p0_c0_000.png\" is not in the plan"},
       {[](TestBench& b) { b.options.board = CharucoBoard{}; },
        "the board was \"none\" and now is \"DICT_5X5_1000 14x14, squares 25 mm"},

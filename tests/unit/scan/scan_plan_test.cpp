@@ -61,7 +61,7 @@ TEST(ScanPlan, RingsThatShareNoAngleButZeroStillGoOnceRound) {
 
 TEST(ScanPlan, EveryViewIsPlannedOnceUnderANameOfItsOwn) {
   ScanPlan plan = plan_of({{"a", 48}, {"b", 24}}, 3);
-  plan.image_format = ImageFormat::jpeg;
+  plan.image_format = PhotographFormat::jpeg;
   const std::vector<PlannedView> views = planned_views(plan);
   EXPECT_EQ(views.size(), 3U * 72U);
   std::set<std::string> names;

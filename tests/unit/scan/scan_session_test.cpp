@@ -139,7 +139,7 @@ TEST(RunScan, CalibratedLensesAndABoardGoIntoTheSession) {
 TEST(RunScan, JpegsAreWrittenOnRequest) {
   const TemporaryFolder folder;
   TestBench bench;
-  bench.options.plan.image_format = ImageFormat::jpeg;
+  bench.options.plan.image_format = PhotographFormat::jpeg;
   ASSERT_TRUE(bench.scan(folder / "s"));
   const Session session = expect_valid_session(folder / "s");
   EXPECT_EQ(session.views[0].image, "images/p0_c0_000.jpg");

@@ -39,10 +39,10 @@ TEST(ConformalFactor, RefusesNothingAndImpossibleLevels) {
   EXPECT_THAT(conformal_factor(one, 1.0).error().what, ::testing::HasSubstr("between 0 and 1"));
 }
 
-TEST(Coverage, HasWilsonsInterval) {
+TEST(BandCoverage, HasWilsonsInterval) {
   std::vector<double> ratios(100, 2.0);
   std::fill_n(ratios.begin(), 80, 0.5);
-  const Coverage coverage = coverage_of(ratios, 1.0);
+  const BandCoverage coverage = coverage_of(ratios, 1.0);
   EXPECT_DOUBLE_EQ(coverage.share, 0.8);
   // Wilson 1927 for 80 of 100.
   EXPECT_NEAR(coverage.low, 0.7112, 1e-4);
