@@ -242,6 +242,7 @@ std::vector<std::string> photographs_of(const SealedPackage& package, std::optio
   }
   if (!most || all.size() <= static_cast<std::size_t>(*most)) return all;
   std::vector<std::string> chosen;
+  chosen.reserve(static_cast<std::size_t>(*most));
   for (int i = 0; i < *most; ++i) chosen.push_back(all[all.size() * i / *most]);
   return chosen;
 }
@@ -251,8 +252,8 @@ std::vector<std::string> photographs_of(const SealedPackage& package, std::optio
 std::string uid_of(const std::string& text) {
   // The first 128 bits of the sum, marked as a UUID of version 8 (free form), as a decimal number.
   const std::string hex = sha256_hex(text);
-  std::vector<int> digits;  // base 16, most significant first
-  for (int i = 0; i < 32; ++i) digits.push_back(std::stoi(hex.substr(i, 1), nullptr, 16));
+  std::vector<int> digits(32);  // base 16, most significant first
+  for (int i = 0; i < 32; ++i) digits[i] = std::stoi(hex.substr(i, 1), nullptr, 16);
   digits[12] = 8;
   digits[16] = 8 + digits[16] % 4;
   std::string decimal;

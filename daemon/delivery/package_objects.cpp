@@ -117,6 +117,7 @@ Result<DeliveryObject> probe_for(const TargetConfig& target, const std::string& 
 
 std::string sum_of(const std::vector<DeliveryObject>& objects) {
   std::vector<ManifestLine> lines;
+  lines.reserve(objects.size());
   for (const DeliveryObject& object : objects) lines.push_back({object.name, object.sha256});
   return sha256_hex(format_manifest(lines));
 }

@@ -36,7 +36,11 @@ Result<fs::path> file_of(const std::string& where) {
 
 }  // namespace
 
-Secret::Secret(Secret&& other) noexcept : text_(other.text_) { other.wipe(); }
+// Copied and wiped, not moved: a short string's bytes would stay behind.
+Secret::Secret(Secret&& other) noexcept {
+  text_ = other.text_;
+  other.wipe();
+}
 
 Secret& Secret::operator=(Secret&& other) noexcept {
   if (this != &other) {
@@ -90,7 +94,7 @@ Result<Secret> read_secret(const std::string& where) {
   const bool sound =
       !text->empty() && text->find_first_of(std::string("\r\n\0", 3)) == std::string::npos;
   Secret secret(*text);
-  OPENSSL_cleanse(text->data(), text->size());
+  OPENSSL_cleanse(&(*text)[0], text->size());
   if (!sound) {
     return fail(ErrorKind::bad_input, file->string(), "must hold a secret in one line");
   }
