@@ -21,8 +21,9 @@ using namespace std::chrono_literals;
 constexpr std::chrono::milliseconds first_pause = 10s;
 constexpr std::chrono::milliseconds longest_pause = 1h;
 
+constexpr int schema_version = 1;
 constexpr const char* schema = R"(
-CREATE TABLE IF NOT EXISTS deliveries (
+CREATE TABLE deliveries (
   id INTEGER PRIMARY KEY AUTOINCREMENT,
   key TEXT NOT NULL UNIQUE,
   package TEXT NOT NULL,
@@ -36,7 +37,6 @@ CREATE TABLE IF NOT EXISTS deliveries (
   last_error TEXT,
   delivered TEXT,
   read_back_sha256 TEXT);
-PRAGMA user_version = 1;
 )";
 
 Result<DeliveryState> state_of(const std::string& name, const fs::path& folder) {
@@ -67,7 +67,7 @@ Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& folder, const Clock
   if (const auto made = make_writable_folder(folder); !made) return forward(made);
   auto database = Database::open(folder / "outbox.db");
   if (!database) return forward(database);
-  if (const auto made = database->execute(schema); !made) return forward(made);
+  if (const auto made = database->make_tables(schema, schema_version); !made) return forward(made);
   return std::unique_ptr<Outbox>(new Outbox(folder, clock, *std::move(database)));
 }
 

@@ -10,9 +10,9 @@
 #include "core/clock.h"
 #include "core/file_descriptor.h"
 #include "core/result.h"
+#include "daemon/database/database.h"
 #include "daemon/delivery/delivery_state.h"
 #include "daemon/delivery/package_objects.h"
-#include "daemon/jobs/database.h"
 
 namespace skullstation {
 

@@ -31,7 +31,6 @@ CREATE TABLE sign_ins (
   csrf TEXT NOT NULL,
   begun_s INTEGER NOT NULL,
   seen_s INTEGER NOT NULL) WITHOUT ROWID;
-PRAGMA user_version = 1;
 )";
 
 Result<void> check_name(const std::string& name) {
@@ -70,28 +69,10 @@ Result<std::unique_ptr<Accounts>> Accounts::open(const std::filesystem::path& fi
                                                  const Clock& clock, AccountOptions options) {
   auto database = Database::open(file);
   if (!database) return forward(database);
+  if (auto made = database->make_tables(schema, schema_version); !made) return forward(made);
   std::unique_ptr<Accounts> accounts(new Accounts(*std::move(database), clock, options));
-  if (auto made = accounts->make_tables(file.string()); !made) return forward(made);
   accounts->nobodys_hash_ = hash_password(random_hex(16), options.cost);
   return accounts;
-}
-
-Result<void> Accounts::make_tables(const std::string& file) {
-  std::int64_t version = 0;
-  {
-    Statement query = database_.statement("PRAGMA user_version");
-    if (query.next()) version = query.integer();
-    if (auto read = query.done(); !read) return read;
-  }
-  if (version == schema_version) return {};
-  if (version != 0) {
-    return fail(ErrorKind::bad_input, file,
-                fmt::format("has format {}; this program knows {}", version, schema_version),
-                "install the version of Skullstation that wrote it");
-  }
-  Transaction transaction(database_);
-  if (auto made = database_.execute(schema); !made) return made;
-  return transaction.commit();
 }
 
 std::int64_t Accounts::now_s() const {

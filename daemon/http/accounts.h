@@ -12,8 +12,8 @@
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "daemon/database/database.h"
 #include "daemon/http/password.h"
-#include "daemon/jobs/database.h"
 
 namespace skullstation {
 
@@ -80,7 +80,6 @@ class Accounts {
  private:
   Accounts(Database database, const Clock& clock, AccountOptions options)
       : database_(std::move(database)), clock_(clock), options_(options) {}
-  Result<void> make_tables(const std::string& file);
   Result<Account> account(const std::string& name);
   Result<void> keep_an_administrator(const std::string& but_for);
   Result<std::optional<SignIn>> find_sign_in(const std::string& token, bool sign_of_life);

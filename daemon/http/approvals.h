@@ -10,7 +10,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
-#include "daemon/jobs/database.h"
+#include "daemon/database/database.h"
 
 namespace skullstation {
 

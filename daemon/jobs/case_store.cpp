@@ -72,7 +72,6 @@ CREATE TABLE events (
   boot TEXT NOT NULL,
   case_id INTEGER,
   what TEXT NOT NULL);
-PRAGMA user_version = 1;
 )";
 
 std::string boot_id() {
@@ -149,34 +148,16 @@ Result<std::unique_ptr<CaseStore>> CaseStore::open(const fs::path& folder, const
 }
 
 Result<void> CaseStore::begin() {
-  if (auto ready = make_tables(); !ready) return ready;
+  if (const std::string damage = database_.damage(); !damage.empty()) {
+    return fail(ErrorKind::bad_input, (folder_ / "station.db").string(), "is damaged: " + damage,
+                "put back a copy of it");
+  }
+  if (auto ready = database_.make_tables(schema, schema_version); !ready) return ready;
   if (auto ready = take_up_interrupted_jobs(); !ready) return ready;
   if (auto ready = remove_unnamed_blobs(); !ready) return ready;
   std::error_code ignored;
   fs::remove_all(folder_ / "work", ignored);  // of steps that a crash ended
   return sync_folder(folder_);
-}
-
-Result<void> CaseStore::make_tables() {
-  const std::string file = (folder_ / "station.db").string();
-  if (const std::string damage = database_.damage(); !damage.empty()) {
-    return fail(ErrorKind::bad_input, file, "is damaged: " + damage, "put back a copy of it");
-  }
-  std::int64_t version = 0;
-  {
-    Statement query = database_.statement("PRAGMA user_version");
-    if (query.next()) version = query.integer();
-    if (auto read = query.done(); !read) return read;
-  }
-  if (version == schema_version) return {};
-  if (version != 0) {
-    return fail(ErrorKind::bad_input, file,
-                fmt::format("has format {}; this program knows {}", version, schema_version),
-                "install the version of Skullstation that wrote it");
-  }
-  Transaction transaction(database_);
-  if (auto made = database_.execute(schema); !made) return made;
-  return transaction.commit();
 }
 
 Result<void> CaseStore::remove_unnamed_blobs() {

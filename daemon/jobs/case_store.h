@@ -12,8 +12,8 @@
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "daemon/database/database.h"
 #include "daemon/jobs/blob_store.h"
-#include "daemon/jobs/database.h"
 #include "daemon/jobs/step_chain.h"
 
 namespace skullstation {
@@ -165,7 +165,6 @@ class CaseStore {
   CaseStore(std::filesystem::path folder, const Clock& clock, std::string version, int lock,
             Database database, BlobStore blobs);
   Result<void> begin();
-  Result<void> make_tables();
   Result<void> take_up_interrupted_jobs();
   Result<void> remove_unnamed_blobs();
   Result<std::int64_t> appoint(std::int64_t case_id, const std::string& step,

@@ -45,6 +45,14 @@ TEST(DeliveryStates, EveryPairIsDecidedAndNothingIsEverDropped) {
   }
 }
 
+TEST_F(OutboxTest, OfANewerProgramIsLeftAlone) {
+  outbox_.reset();
+  ASSERT_TRUE(Database::open(folder_ / "outbox/outbox.db")->execute("PRAGMA user_version = 9"));
+  const auto opened = Outbox::open(folder_ / "outbox", clock_);
+  ASSERT_FALSE(opened);
+  EXPECT_THAT(opened.error().message(), HasSubstr("outbox.db: has format 9; this program knows 1"));
+}
+
 TEST(BackOff, GrowsToAnHourAndIsSpread) {
   for (const int attempts : {1, 2, 5, 9, 10, 50, 1'000'000}) {
     const auto longest =

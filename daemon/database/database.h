@@ -62,6 +62,9 @@ class Database {
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
 
+  /// Makes the tables of a new file by `schema` and marks it with `version` (from 1); a file that
+  /// has them already is left as it is. Errors (bad_input): the file is of another version.
+  Result<void> make_tables(const std::string& schema, int version);
   /// Several statements without parameters.
   Result<void> execute(const std::string& sql);
   Statement statement(std::string_view sql) { return {handle_, sql}; }

@@ -1,4 +1,4 @@
-#include "daemon/jobs/database.h"
+#include "daemon/database/database.h"
 
 #include <fmt/format.h>
 #include <sqlite3.h>
@@ -104,6 +104,24 @@ Result<Database> Database::open(const std::filesystem::path& file) {
 Database::~Database() { sqlite3_close(handle_); }
 
 Database::Database(Database&& other) noexcept : handle_(std::exchange(other.handle_, nullptr)) {}
+
+Result<void> Database::make_tables(const std::string& schema, int version) {
+  Transaction transaction(*this);  // another program may be about to make them too
+  std::int64_t found = 0;
+  Statement query = statement("PRAGMA user_version");
+  if (query.next()) found = query.integer();
+  if (auto read = query.done(); !read) return read;
+  if (found == version) return {};
+  if (found != 0) {
+    return fail(ErrorKind::bad_input, sqlite3_db_filename(handle_, "main"),
+                fmt::format("has format {}; this program knows {}", found, version),
+                "install the version of Skullstation that wrote it");
+  }
+  if (auto made = execute(schema + fmt::format("PRAGMA user_version = {};", version)); !made) {
+    return made;
+  }
+  return transaction.commit();
+}
 
 Result<void> Database::execute(const std::string& sql) {
   const int status = sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr);
