@@ -108,6 +108,7 @@ Result<CommandReport> run(const FitSkullCommand& command, const CommonOptions& c
                      {"templates", name_of(command.templates)},
                      {"input_from_template", matrix_rows(fit->input_from_template.matrix())},
                      {"facial", json_of(quality.facial)},
+                     {"facial_bone", json_of(quality.facial_bone)},
                      {"outer", json_of(quality.outer)},
                      {"inverted_tetrahedra", quality.inverted_tetrahedra},
                      {"least_scaled_volume", quality.least_scaled_volume},
@@ -124,6 +125,7 @@ Result<CommandReport> run(const FitSkullCommand& command, const CommonOptions& c
   CommandReport report;
   report.json = json.dump(2);
   report.text = heading() + row_of("input's face to fit", quality.facial) +
+                row_of("the same without teeth", quality.facial_bone) +
                 row_of("input's outside to fit", quality.outer) +
                 fmt::format(
                     "{} inverted tetrahedra, least volume {:.2f} of rest; {:.0f} % of the outside "

@@ -5,6 +5,7 @@
 
 #include "core/parallel.h"
 #include "reconstruction/distance/triangle_bvh.h"
+#include "reconstruction/rendering/outside.h"
 
 namespace skullstation {
 
@@ -13,6 +14,8 @@ constexpr double kObserved_mm = 2.0;
 constexpr double kObservedAngle_deg = 60.0;
 /// Of the input's vertices; more tell no more.
 constexpr int kMeasured = 60000;
+/// Rays over the whole sphere to learn whether a vertex of the input lies on its outside.
+constexpr int kDirections = 100;
 constexpr int kChunk = 512;
 }  // namespace
 
@@ -77,6 +80,9 @@ void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
   const auto points = static_cast<int>(input.mesh().vertices.rows());
   const int stride = std::max(1, points / kMeasured);
   const int measured = (points + stride - 1) / stride;
+  std::vector<int> own(static_cast<std::size_t>(measured));
+  for (int i = 0; i < measured; ++i) own[static_cast<std::size_t>(i)] = i * stride;
+  const std::vector<bool> on_outside = outside_vertices(input.mesh(), own, kDirections, threads);
   std::vector<ClosestPoint> hits(static_cast<std::size_t>(measured));
   parallel_for((measured + kChunk - 1) / kChunk, threads, [&](int chunk) {
     for (int i = chunk * kChunk; i < std::min(measured, (chunk + 1) * kChunk); ++i) {
@@ -84,20 +90,26 @@ void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
     }
   });
   std::vector<double> facial;
+  std::vector<double> facial_bone;
   std::vector<double> all;
-  for (const ClosestPoint& hit : hits) {
-    bool outside = true;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const ClosestPoint& hit = hits[i];
+    bool outside = on_outside[i];
     bool face = true;
-    for (int i = 0; i < 3; ++i) {
-      const auto v = static_cast<std::size_t>(skull.boundary(hit.triangle, i));
+    bool tooth = false;
+    for (int c = 0; c < 3; ++c) {
+      const auto v = static_cast<std::size_t>(skull.boundary(hit.triangle, c));
       outside = outside && skull.outer[v];
       face = face && is_facial(skull.region[v]);
+      tooth = tooth || is_tooth(skull.region[v]);
     }
     if (!outside) continue;
     all.push_back(hit.distance_mm);
     if (face) facial.push_back(hit.distance_mm);
+    if (face && !tooth) facial_bone.push_back(hit.distance_mm);
   }
   quality.facial = distances_of(std::move(facial));
+  quality.facial_bone = distances_of(std::move(facial_bone));
   quality.outer = distances_of(std::move(all));
 
   const Eigen::ArrayXd shares = signed_volumes(skull.tetrahedra, vertices).array() /

@@ -6,14 +6,15 @@
 
 #include "core/parallel.h"
 #include "core/units.h"
+#include "reconstruction/registration/oriented_point_tree.h"
 
 namespace skullstation {
 
 namespace {
 
-/// Teeth differ most between people, break, and shine in CT.
 constexpr double kToothWeight = 0.3;
-constexpr double kLeastScale_mm = 0.5;
+/// What opposite normals add to a distance, half of it.
+constexpr double kNormal_mm = 10.0;
 constexpr int kChunk = 512;
 
 template <class Work>
@@ -23,12 +24,8 @@ void for_each_vertex(int count, int threads, const Work& work) {
   });
 }
 
-bool is_tooth(SkullRegion region) {
-  return region == SkullRegion::upper_teeth || region == SkullRegion::lower_teeth;
-}
-
 /// Pairs farther apart than most count less (Welsch, scale from the median).
-void weigh(SkullPairs& pairs, const SkullState& state) {
+void weigh(SkullPairs& pairs, const SkullState& state, double least_scale_mm) {
   std::vector<double> distances;
   for (int v = 0; v < state.skull->boundary_count; ++v) {
     if (pairs.weight[v] > 0.0) {
@@ -39,7 +36,7 @@ void weigh(SkullPairs& pairs, const SkullState& state) {
   if (distances.empty()) return;
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
-  const double nu = std::max(3.0 * *middle, kLeastScale_mm);
+  const double nu = std::max(3.0 * *middle, least_scale_mm);
   double squares = 0.0;
   for (int v = 0; v < state.skull->boundary_count; ++v) {
     if (pairs.weight[v] <= 0.0) continue;
@@ -102,8 +99,51 @@ SkullPairs part_pairs(const SkullState& rest, const PartAlignment& parts, const 
                               limits.distance_mm, limits.normal_deg),
          1.0);
   });
-  weigh(pairs, moved);
+  weigh(pairs, moved, limits.least_scale_mm);
   pairs.anchored.assign(pairs.anchored.size(), true);
+  return pairs;
+}
+
+SkullPairs far_pairs(const SkullState& state, const InputSurface& input, const PairLimits& limits,
+                     int threads) {
+  const SkullTemplate& skull = *state.skull;
+  const OrientedPoints& samples = input.samples();
+  const double least_cosine = std::cos(radians(limits.normal_deg));
+  const auto alike = [&](int v, int sample) {
+    return (state.surface.vertices.row(v) - samples.positions.row(sample)).norm() <=
+               limits.distance_mm &&
+           state.surface.normals.row(v).dot(samples.normals.row(sample)) >= least_cosine;
+  };
+  const OrientedPointTree own({state.surface.vertices, state.surface.normals}, kNormal_mm);
+  const OrientedPointTree theirs(samples, kNormal_mm);
+  std::vector<int> chosen(static_cast<std::size_t>(samples.size()), -1);
+  for_each_vertex(static_cast<int>(samples.size()), threads, [&](int i) {
+    const int v = own.nearest(samples.positions.row(i), samples.normals.row(i)).index;
+    if (alike(v, i)) chosen[static_cast<std::size_t>(i)] = v;
+  });
+  SkullPairs pairs = no_pairs(skull.boundary_count);
+  for (int i = 0; i < static_cast<int>(samples.size()); ++i) {
+    const int v = chosen[static_cast<std::size_t>(i)];
+    if (v < 0 || !skull.outer[static_cast<std::size_t>(v)]) continue;
+    pairs.weight[v] += 1.0;
+    pairs.target.row(v) += samples.positions.row(i);
+    pairs.normal.row(v) += samples.normals.row(i);
+  }
+  for_each_vertex(skull.boundary_count, threads, [&](int v) {
+    if (!skull.outer[static_cast<std::size_t>(v)]) return;
+    if (pairs.weight[v] > 0.0) {
+      pairs.target.row(v) /= pairs.weight[v];
+      pairs.normal.row(v).normalize();
+      pairs.weight[v] = 1.0;
+      return;
+    }
+    const int i = theirs.nearest(state.surface.vertices.row(v), state.surface.normals.row(v)).index;
+    if (!alike(v, i)) return;
+    pairs.weight[v] = 1.0;
+    pairs.target.row(v) = samples.positions.row(i);
+    pairs.normal.row(v) = samples.normals.row(i);
+  });
+  weigh(pairs, state, limits.least_scale_mm);
   return pairs;
 }
 
@@ -119,7 +159,7 @@ SkullPairs ridge_pairs(const SkullState& state, const std::vector<bool>& ridge,
                              limits.distance_mm, limits.normal_deg),
          1.0);
   });
-  weigh(pairs, state);
+  weigh(pairs, state, limits.least_scale_mm);
   pairs.anchored.assign(pairs.anchored.size(), true);
   return pairs;
 }
@@ -152,7 +192,7 @@ SkullPairs two_way_pairs(const SkullState& state, const InputSurface& input,
                              2.0 * limits.distance_mm, limits.normal_deg),
          weight);
   });
-  weigh(pairs, state);
+  weigh(pairs, state, limits.least_scale_mm);
   return pairs;
 }
 

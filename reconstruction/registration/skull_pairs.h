@@ -22,6 +22,9 @@ struct SkullPairs {
 struct PairLimits {
   double distance_mm = 4.0;
   double normal_deg = 35.0;
+  /// Pairs count less beyond three times their median, but not before this: what lies far from a
+  /// template that lies well elsewhere must still pull at first.
+  double least_scale_mm = 0.5;
 };
 
 /// The template as it lies now.
@@ -39,6 +42,12 @@ SkullState state_of(const SkullTemplate& skull, Points3 vertices);
 /// Where the parts' own transforms bring their outer vertices (from the rest state's `surface`).
 SkullPairs part_pairs(const SkullState& rest, const PartAlignment& parts, const InputSurface& input,
                       const PairLimits& limits, int threads);
+
+/// Where template and input lie far from each other: both ways, each with the other's nearest point
+/// whose normal is alike (OrientedPointTree). A vertex that points of the input have chosen goes to
+/// their middle, another to the point that it chooses itself.
+SkullPairs far_pairs(const SkullState& state, const InputSurface& input, const PairLimits& limits,
+                     int threads);
 
 /// Outer vertices where the template bends most, each with the nearest such point of the input.
 SkullPairs ridge_pairs(const SkullState& state, const std::vector<bool>& ridge,

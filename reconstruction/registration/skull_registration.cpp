@@ -24,7 +24,7 @@ namespace skullstation {
 
 namespace {
 
-enum class Search { ridges, two_way_and_ridges, two_way };
+enum class Search { far, ridges, two_way_and_ridges, two_way };
 
 /// A stretch of iterations at one stiffness.
 struct Level {
@@ -39,6 +39,8 @@ struct Level {
 
 /// Stiff to soft. Its fourth root is about the length over which a displacement may turn.
 constexpr Level kLevels[] = {
+    {"far", Search::far, 1e6, 1.0, {20.0, 45.0, 8.0}, 0.0, 3},
+    {"far, soft", Search::far, 1e5, 1.0, {15.0, 45.0, 6.0}, 0.0, 6},
     {"curvature", Search::ridges, 1e5, 1.0, {8.0, 45.0}, 0.0, 3},
     {"two-way, stiff", Search::two_way_and_ridges, 1e5, 1.0, {6.0, 40.0}, 0.0, 6},
     {"two-way", Search::two_way_and_ridges, 1e4, 1.0, {5.0, 40.0}, 0.0, 6},
@@ -105,21 +107,16 @@ class Fit {
   void run(const Level& level) {
     begin_stage();
     // The smoothness of the whole displacement counts; the volume terms count from level to level.
-    const Points3 before =
-        options_.regularizer == SkullRegularizer::smooth ? rest_ : state_.vertices;
+    Points3 before = options_.regularizer == SkullRegularizer::smooth ? rest_ : state_.vertices;
     SkullPairs pairs;
     double move = 0.0;
     int iteration = 0;
     while (iteration < level.iterations) {
-      pairs =
-          level.search == Search::ridges
-              ? ridge_pairs(state_, ridge_, input_, level.limits, options_.threads)
-              : two_way_pairs(state_, input_, level.limits, level.inner_weight, options_.threads);
-      if (level.search == Search::two_way_and_ridges) {
-        put_over(pairs, ridge_pairs(state_, ridge_, input_, level.limits, options_.threads));
-      }
+      pairs = pairs_of(level);
       move = deform(before, pairs, level.smooth_mm4, level.volume, iteration == 0);
       ++iteration;
+      // What lies far off flows there; bending back from there would cost as much as the way.
+      if (level.search == Search::far) before = rest_ = state_.vertices;
       if (move < 0.01) break;
     }
     end_stage(level.name, iteration, pairs, move);
@@ -176,6 +173,21 @@ class Fit {
   FitStages take_stages() { return std::move(stages_); }
 
  private:
+  SkullPairs pairs_of(const Level& level) const {
+    if (level.search == Search::far) {
+      return far_pairs(state_, input_, level.limits, options_.threads);
+    }
+    if (level.search == Search::ridges) {
+      return ridge_pairs(state_, ridge_, input_, level.limits, options_.threads);
+    }
+    SkullPairs pairs =
+        two_way_pairs(state_, input_, level.limits, level.inner_weight, options_.threads);
+    if (level.search == Search::two_way_and_ridges) {
+      put_over(pairs, ridge_pairs(state_, ridge_, input_, level.limits, options_.threads));
+    }
+    return pairs;
+  }
+
   static Eigen::VectorXd area_shares(const SkullTemplate& skull) {
     Eigen::VectorXd area = Eigen::VectorXd::Zero(skull.boundary_count);
     for (Eigen::Index f = 0; f < skull.boundary.rows(); ++f) {

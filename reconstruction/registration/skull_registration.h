@@ -34,6 +34,7 @@ struct SkullRegistrationOptions {
 
 struct SkullFitQuality {
   FitDistances facial;               ///< vertices of the input's facial area, to the fitted surface
+  FitDistances facial_bone;          ///< those that lie on no tooth
   FitDistances outer;                ///< all outer vertices of the input, to the fitted surface
   int inverted_tetrahedra = 0;       ///< never more than 0
   double least_scaled_volume = 0.0;  ///< least volume of a tetrahedron in units of its rest volume

@@ -49,6 +49,10 @@ SkullBone bone_of(SkullRegion region) { return facts(region).bone; }
 
 bool is_facial(SkullRegion region) { return facts(region).facial; }
 
+bool is_tooth(SkullRegion region) {
+  return region == SkullRegion::upper_teeth || region == SkullRegion::lower_teeth;
+}
+
 Result<void> SkullTemplate::validate() const {
   const auto bad = [](std::string what) {
     return fail(ErrorKind::bad_input, "skull template", std::move(what), "make it again");

@@ -47,6 +47,9 @@ SkullBone bone_of(SkullRegion region);
 /// covers in front of the ears.
 bool is_facial(SkullRegion region);
 
+/// Teeth differ most between people, break, and shine in CT.
+bool is_tooth(SkullRegion region);
+
 /// A solid skull that can be deformed onto others, in the anatomical frame [mm] (LPS axes,
 /// Frankfurt plane z = 0, origin midway between the porions). Gietzen et al. 2019: about 70,000
 /// vertices.

@@ -13,7 +13,7 @@
 #include "reconstruction/registration/surface_places.h"
 #include "reconstruction/templates/distance_grid.h"
 #include "reconstruction/templates/make_templates.h"
-#include "reconstruction/templates/outside.h"
+#include "reconstruction/rendering/outside.h"
 #include "reconstruction/templates/skull_regions.h"
 #include "reconstruction/templates/tetrahedralization.h"
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/random.h"
+#include "reconstruction/registration/oriented_point_tree.h"
 
 namespace skullstation {
 namespace {
@@ -34,6 +35,37 @@ TEST(PointTree, AgreesWithASearchOfAllPoints) {
     ASSERT_EQ(five.size(), 5U);
     EXPECT_EQ(five[0].index, nearest);
   }
+}
+
+TEST(OrientedPointTree, AgreesWithASearchOfAllPoints) {
+  Random random(5);
+  const auto direction = [&] {
+    return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+  };
+  OrientedPoints points{Points3(400, 3), Points3(400, 3)};
+  for (Eigen::Index i = 0; i < points.size(); ++i) {
+    for (int c = 0; c < 3; ++c) points.positions(i, c) = random.uniform(-10, 10);
+    points.normals.row(i) = direction().transpose();
+  }
+  constexpr double normal_mm = 10.0;
+  const OrientedPointTree tree(points, normal_mm);
+  for (int query = 0; query < 50; ++query) {
+    const Eigen::Vector3d at = 12.0 * direction();
+    const Eigen::Vector3d normal = direction();
+    const Eigen::VectorXd squares =
+        (points.positions.rowwise() - at.transpose()).rowwise().squaredNorm() +
+        normal_mm * normal_mm *
+            (points.normals.rowwise() - normal.transpose()).rowwise().squaredNorm();
+    Eigen::Index nearest = 0;
+    const double least = squares.minCoeff(&nearest);
+    const NearPoint found = tree.nearest(at, normal);
+    EXPECT_EQ(found.index, nearest);
+    EXPECT_NEAR(found.squared_distance, least, 1e-9);
+  }
+  EXPECT_EQ(OrientedPointTree({Points3(0, 3), Points3(0, 3)}, 1.0)
+                .nearest(Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX())
+                .index,
+            -1);
 }
 
 TEST(PointTree, WithoutPointsNothingIsNear) {

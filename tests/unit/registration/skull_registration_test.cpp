@@ -72,6 +72,14 @@ TEST(SkullRegistration, FindsAPersonsSkullInAnyPose) {
   EXPECT_LT(sum / count, 3.0);
 }
 
+TEST(SkullRegistration, FollowsAFaceMuchLongerThanTheTemplates) {
+  const Person far = PersonMaker(3.0, 0).make(draw_person(mix(1000, 2)), 0);
+  const auto fit = register_skull(skull_template(), far.skull, {.threads = 2});
+  ASSERT_TRUE(fit) << fit.error().message();
+  EXPECT_LT(fit->quality.facial.p95_mm, 2.0) << "its upper teeth lie 15 mm below the template's";
+  EXPECT_GT(fit->quality.observed_share, 0.8);
+}
+
 TEST(SkullRegistration, GivesTheSameBytesForAnyNumberOfThreads) {
   const Similarity3 identity;
   const auto one =
