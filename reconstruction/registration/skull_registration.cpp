@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -98,6 +99,7 @@ class Fit {
     }
     state_ = state_of(skull_, std::move(placed));
     rest_ = state_.vertices;
+    bone_found_ = parts.bone_found;
     const SkullPairs pairs = part_pairs(state_, parts, input_, kPartLimits, options_.threads);
     const double move = deform(rest_, pairs, kPartsSmooth_mm4, 1.0, true);
     end_stage("parts", 1, pairs, move);
@@ -175,7 +177,13 @@ class Fit {
  private:
   SkullPairs pairs_of(const Level& level) const {
     if (level.search == Search::far) {
-      return far_pairs(state_, input_, level.limits, options_.threads);
+      SkullPairs pairs = far_pairs(state_, input_, level.limits, options_.threads);
+      for (int v = 0; v < skull_.boundary_count;
+           ++v) {  // far is no place for a bone that is missing
+        const SkullBone bone = bone_of(skull_.region[static_cast<std::size_t>(v)]);
+        if (!bone_found_[static_cast<std::size_t>(bone)]) pairs.weight[v] = 0.0;
+      }
+      return pairs;
     }
     if (level.search == Search::ridges) {
       return ridge_pairs(state_, ridge_, input_, level.limits, options_.threads);
@@ -259,7 +267,8 @@ class Fit {
   Eigen::VectorXd area_share_;  ///< of each surface vertex, of the outer surface
   std::vector<bool> ridge_;     ///< surface vertices where the template bends most
   SkullState state_;
-  Points3 rest_;  ///< #V x 3: the bones placed and stretched, not yet bent
+  Points3 rest_;                      ///< #V x 3: the bones placed and stretched, not yet bent
+  std::array<bool, 2> bone_found_{};  ///< by SkullBone, when the parts were laid on the input
   FitStages stages_;
   double began_s_ = 0.0;
 };
