@@ -2,6 +2,7 @@
 // docs/registration.md. Usage:
 //   bench_registration skulls TEMPLATE [N = 20] [seed = 1000]    people of a seed of their own
 //   bench_registration heads  TEMPLATE [N = 20] [seed = 1000]
+//   bench_registration led-heads TEMPLATE [N = 20] [seed = 1000]   heads led by their skulls
 //   bench_registration mesh   TEMPLATE SKULL.ply...              real skulls
 //   bench_registration poses  TEMPLATE [N = 100] [SKULL.ply...]  global registration alone
 // TEMPLATE is a file made by `skullstation template build`.
@@ -22,6 +23,7 @@
 #include "reconstruction/io/mesh_file.h"
 #include "reconstruction/phantom/person.h"
 #include "reconstruction/registration/global_registration.h"
+#include "reconstruction/registration/head_led_by_skull.h"
 #include "reconstruction/registration/head_registration.h"
 #include "reconstruction/registration/skull_registration.h"
 #include "reconstruction/templates/template_file.h"
@@ -147,7 +149,9 @@ int bench_skulls(const SkullTemplate& skull, int people, std::uint64_t seed) {
   return done == people ? 0 : 1;
 }
 
-int bench_heads(const HeadTemplate& head, int people, std::uint64_t seed) {
+/// With `skull`, each head is led by its skull, as in model building.
+int bench_heads(const HeadTemplate& head, const SkullTemplate* skull, int people,
+                std::uint64_t seed) {
   fmt::print(
       "| person | weighted RMS mm (<= 0.19) | kept % (>= 90) | face mean | face P95 | "
       "correspondence mean, face | processor s (<= 10) |\n|---|---|---|---|---|---|---|\n");
@@ -159,8 +163,20 @@ int bench_heads(const HeadTemplate& head, int people, std::uint64_t seed) {
     const Person person = maker.make(draw_person(mix(seed, static_cast<std::uint64_t>(i))), 0);
     Random random(mix(seed + 1, static_cast<std::uint64_t>(i)));
     const Similarity3 pose = random_pose(random);
+    HeadRegistrationOptions options;
+    Similarity3 bone_pose;
+    if (skull != nullptr) {
+      const auto bone = register_skull(*skull, moved(pose, person.skull));
+      if (!bone) {
+        fmt::print("| {} | {} |\n", i + 1, bone.error().message());
+        continue;
+      }
+      options.start = head_led_by_skull(head, *skull, *bone);
+      bone_pose = bone->input_from_template;
+      options.pose = &bone_pose;
+    }
     const Seconds began = Seconds::now();
-    const auto fit = register_head(head, moved(pose, person.skin));
+    const auto fit = register_head(head, moved(pose, person.skin), options);
     const double seconds = (Seconds::now() - began).processor;
     if (!fit) {
       fmt::print("| {} | {} |\n", i + 1, fit.error().message());
@@ -293,7 +309,8 @@ int bench_poses(const SkullTemplate& skull, int poses, const std::vector<std::st
 
 int run(const std::vector<std::string>& arguments) {
   if (arguments.size() < 2) {
-    fmt::print(stderr, "usage: bench_registration skulls|heads|mesh|poses TEMPLATE ...\n");
+    fmt::print(stderr,
+               "usage: bench_registration skulls|heads|led-heads|mesh|poses TEMPLATE ...\n");
     return 2;
   }
   const auto templates = read_templates(arguments[1]);
@@ -308,7 +325,10 @@ int run(const std::vector<std::string>& arguments) {
   };
   const auto seed = static_cast<std::uint64_t>(number(1, 1000));
   if (what == "skulls") return bench_skulls(templates->skull, number(0, 20), seed);
-  if (what == "heads") return bench_heads(templates->head, number(0, 20), seed);
+  if (what == "heads") return bench_heads(templates->head, nullptr, number(0, 20), seed);
+  if (what == "led-heads") {
+    return bench_heads(templates->head, &templates->skull, number(0, 20), seed);
+  }
   if (what == "mesh") return bench_meshes(templates->skull, rest);
   if (what == "poses") {
     const std::vector<std::string> files(rest.begin() + (rest.empty() ? 0 : 1), rest.end());

@@ -9,6 +9,7 @@
 #include "core/file.h"
 #include "core/parallel.h"
 #include "reconstruction/io/mesh_file.h"
+#include "reconstruction/registration/head_led_by_skull.h"
 #include "reconstruction/registration/head_registration.h"
 #include "reconstruction/registration/skull_registration.h"
 #include "reconstruction/statistics/subject_file.h"
@@ -100,6 +101,7 @@ Result<ModelSubject> fit_subject(const fs::path& folder, const SkullTemplate& sk
   }
   HeadRegistrationOptions head_options;
   head_options.pose = &skull_fit->input_from_template;
+  head_options.start = head_led_by_skull(head, skull, *skull_fit);
   head_options.seed = options.seed;
   head_options.threads = options.threads;
   const auto head_fit = register_head(head, *skin, head_options, progress.part(0.8, 1.0));
