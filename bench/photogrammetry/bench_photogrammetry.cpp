@@ -130,6 +130,8 @@ Result<void> print_physics(const Options& options) {
                                        {.every = 2, .noise_sd = 4.0},
                                        {.every = 2, .noise_sd = 8.0},
                                        {.every = 2, .halvings = 1}};
+  std::vector<TriangleMesh> surfaces;
+  std::vector<std::string> names;
   for (BenchViewOptions variant : variants) {
     variant.threads = options.threads;
     const auto views = load_bench_views(*folder, variant);
@@ -154,6 +156,19 @@ Result<void> print_physics(const Options& options) {
                views->size(), variant.noise_sd, pixel_mm, passed_s, m->mean_mm, m->median_mm,
                m->p95_mm, m->within_1mm_percent, m->seen_cm2);
     std::fflush(stdout);
+    surfaces.push_back(surface->mesh);
+    names.push_back(fmt::format("{:>6} {:>6} {:>9.2f}", views->size(), variant.noise_sd, pixel_mm));
+  }
+  double common_cm2 = 0.0;
+  const auto common = measure_what_all_hold(surfaces, *truth, options.threads, common_cm2);
+  if (!common) return forward(common);
+  fmt::print(
+      "\nthe truth's distance from each, on the {:.0f} cm2 that all of them hold\n{:>6} {:>6} "
+      "{:>9} | {:>6} {:>6} {:>6}\n",
+      common_cm2, "views", "noise", "pixel mm", "mean", "median", "P95");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const CommonMeasures& m = (*common)[i];
+    fmt::print("{} | {:>6.3f} {:>6.3f} {:>6.2f}\n", names[i], m.mean_mm, m.median_mm, m.p95_mm);
   }
   return {};
 }

@@ -125,6 +125,43 @@ Result<SurfaceMeasures> measure_surface(const TriangleMesh& surface, const Trian
   return measures;
 }
 
+Result<std::vector<CommonMeasures>> measure_what_all_hold(std::span<const TriangleMesh> surfaces,
+                                                          const TriangleMesh& truth, int threads,
+                                                          double& common_cm2) {
+  constexpr double most_mm = 2.0;
+  const auto samples = sample_surface(truth, 0.5);
+  if (!samples) return forward(samples);
+  std::vector<std::vector<double>> gaps_mm;
+  std::vector<char> common(samples->size(), 1);
+  for (const TriangleMesh& surface : surfaces) {
+    const TriangleBvh tree(surface);
+    std::vector<double>& gaps = gaps_mm.emplace_back(samples->size());
+    for_each_sample(*samples, threads, [&](int i) {
+      const ClosestPoint closest = tree.closest((*samples)[i].point, most_mm);
+      gaps[i] = closest.triangle < 0 ? most_mm : closest.distance_mm;
+      if (gaps[i] >= most_mm) common[i] = 0;
+    });
+  }
+  common_cm2 = 0.0;
+  for (std::size_t i = 0; i < samples->size(); ++i) {
+    if (common[i] != 0) common_cm2 += (*samples)[i].area_mm2 / 100.0;
+  }
+  std::vector<CommonMeasures> measures;
+  for (const std::vector<double>& gaps : gaps_mm) {
+    std::vector<double> held;
+    for (std::size_t i = 0; i < gaps.size(); ++i) {
+      if (common[i] != 0) held.push_back(gaps[i]);
+    }
+    CommonMeasures& m = measures.emplace_back();
+    if (held.empty()) continue;
+    std::sort(held.begin(), held.end());
+    for (const double gap : held) m.mean_mm += gap / static_cast<double>(held.size());
+    m.median_mm = held[held.size() / 2];
+    m.p95_mm = held[held.size() * 95 / 100];
+  }
+  return measures;
+}
+
 std::array<EstimatedAccuracy, 5> check_estimates(const TriangleMesh& surface,
                                                  std::span<const float> accuracy_mm,
                                                  const TriangleMesh& truth, int threads) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <span>
+#include <vector>
 
 #include "core/result.h"
 #include "core/triangle_mesh.h"
@@ -33,6 +34,19 @@ struct SurfaceMeasures {
 /// Seen: less than 84 deg off the normal and nothing of the specimen before it.
 Result<SurfaceMeasures> measure_surface(const TriangleMesh& surface, const TriangleMesh& truth,
                                         std::span<const StereoView> views, int threads);
+
+/// Distances of the truth, half a millimetre apart, from surfaces: what none of them misses by 2 mm
+/// or more. Each surface's own error is over what it holds, and the worse one may hold less.
+struct CommonMeasures {
+  double mean_mm = 0.0;
+  double median_mm = 0.0;
+  double p95_mm = 0.0;
+};
+
+/// One for each surface; `common_cm2` is how much of the truth all of them hold.
+Result<std::vector<CommonMeasures>> measure_what_all_hold(std::span<const TriangleMesh> surfaces,
+                                                          const TriangleMesh& truth, int threads,
+                                                          double& common_cm2);
 
 /// A fifth of a surface's vertices.
 struct EstimatedAccuracy {
