@@ -224,11 +224,13 @@ void align_bones(const SkullTemplate& skull, const TriangleMesh& surface, const 
       }
     }
     const Similarity3 placed = found.value_or(Similarity3{});
-    result.bone_found[b] = cost_of(points, placed, whole) < kFoundCost_mm2;
+    // A scan without cranium is refused by its size and shape; without mandible many are.
+    const bool there = b == 0 || cost_of(points, placed, whole) < kFoundCost_mm2;
+    if (b == 1) result.mandible_found = there;
     ++result.parts;
     result.accepted += found.has_value() ? 1 : 0;
     result.bones[b] = affine(placed) * parent;
-    if (!result.bone_found[b]) continue;
+    if (!there) continue;
     for (const double reach_mm : {12.0, 6.0}) {
       result.bones[b] = fit_affine(own, input, result.bones[b], reach_mm);
     }

@@ -14,7 +14,7 @@ namespace skullstation {
 struct PartAlignment {
   std::array<Eigen::Affine3d, 2> bones;                ///< by SkullBone
   std::array<Similarity3, kSkullRegionCount> regions;  ///< by SkullRegion, after its bone's
-  std::array<bool, 2> bone_found = {false, false};
+  bool mandible_found = false;
   int parts = 0;
   int accepted = 0;  ///< the others keep what they belong to
 };

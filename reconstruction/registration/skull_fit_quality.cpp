@@ -86,7 +86,8 @@ void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
   std::vector<ClosestPoint> hits(static_cast<std::size_t>(measured));
   parallel_for((measured + kChunk - 1) / kChunk, threads, [&](int chunk) {
     for (int i = chunk * kChunk; i < std::min(measured, (chunk + 1) * kChunk); ++i) {
-      hits[static_cast<std::size_t>(i)] = bvh.closest(input.mesh().vertices.row(i * stride));
+      hits[static_cast<std::size_t>(i)] =
+          bvh.closest(input.mesh().vertices.row(own[static_cast<std::size_t>(i)]));
     }
   });
   std::vector<double> facial;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -30,24 +29,24 @@ enum class Search { far, ridges, two_way_and_ridges, two_way };
 /// A stretch of iterations at one stiffness.
 struct Level {
   const char* name;
-  Search search;
   double smooth_mm4;
   double volume;  ///< weight of the volume term, where it is chosen
   PairLimits limits;
   double inner_weight;
+  Search search;
   int iterations;
 };
 
 /// Stiff to soft. Its fourth root is about the length over which a displacement may turn.
 constexpr Level kLevels[] = {
-    {"far", Search::far, 1e6, 1.0, {20.0, 45.0, 8.0}, 0.0, 3},
-    {"far, soft", Search::far, 1e5, 1.0, {15.0, 45.0, 6.0}, 0.0, 6},
-    {"curvature", Search::ridges, 1e5, 1.0, {8.0, 45.0}, 0.0, 3},
-    {"two-way, stiff", Search::two_way_and_ridges, 1e5, 1.0, {6.0, 40.0}, 0.0, 6},
-    {"two-way", Search::two_way_and_ridges, 1e4, 1.0, {5.0, 40.0}, 0.0, 6},
-    {"two-way, soft", Search::two_way_and_ridges, 1e3, 1.0, {4.0, 35.0}, 0.0, 4},
-    {"two-way, softer", Search::two_way, 1e2, 1.0, {3.0, 35.0}, 0.05, 3},
-    {"fine", Search::two_way, 1e1, 0.1, {2.0, 30.0}, 0.05, 3},
+    {"far", 1e6, 1.0, {20.0, 45.0, 8.0}, 0.0, Search::far, 3},
+    {"far, soft", 1e5, 1.0, {15.0, 45.0, 6.0}, 0.0, Search::far, 6},
+    {"curvature", 1e5, 1.0, {8.0, 45.0}, 0.0, Search::ridges, 3},
+    {"two-way, stiff", 1e5, 1.0, {6.0, 40.0}, 0.0, Search::two_way_and_ridges, 6},
+    {"two-way", 1e4, 1.0, {5.0, 40.0}, 0.0, Search::two_way_and_ridges, 6},
+    {"two-way, soft", 1e3, 1.0, {4.0, 35.0}, 0.0, Search::two_way_and_ridges, 4},
+    {"two-way, softer", 1e2, 1.0, {3.0, 35.0}, 0.05, Search::two_way, 3},
+    {"fine", 1e1, 0.1, {2.0, 30.0}, 0.05, Search::two_way, 3},
 };
 constexpr double kPartsSmooth_mm4 = 1e6;
 constexpr PairLimits kPartLimits{5.0, 45.0};
@@ -90,7 +89,7 @@ class Fit {
   /// Hierarchical ICP, then the whole template after its parts.
   PartAlignment follow_parts() {
     begin_stage();
-    const PartAlignment parts = align_parts(skull_, state_.surface, input_, options_.threads);
+    PartAlignment parts = align_parts(skull_, state_.surface, input_, options_.threads);
     Points3 placed(skull_.vertices.rows(), 3);
     for (Eigen::Index v = 0; v < placed.rows(); ++v) {
       const auto bone =
@@ -99,7 +98,7 @@ class Fit {
     }
     state_ = state_of(skull_, std::move(placed));
     rest_ = state_.vertices;
-    bone_found_ = parts.bone_found;
+    mandible_found_ = parts.mandible_found;
     const SkullPairs pairs = part_pairs(state_, parts, input_, kPartLimits, options_.threads);
     const double move = deform(rest_, pairs, kPartsSmooth_mm4, 1.0, true);
     end_stage("parts", 1, pairs, move);
@@ -178,10 +177,12 @@ class Fit {
   SkullPairs pairs_of(const Level& level) const {
     if (level.search == Search::far) {
       SkullPairs pairs = far_pairs(state_, input_, level.limits, options_.threads);
-      for (int v = 0; v < skull_.boundary_count;
-           ++v) {  // far is no place for a bone that is missing
-        const SkullBone bone = bone_of(skull_.region[static_cast<std::size_t>(v)]);
-        if (!bone_found_[static_cast<std::size_t>(bone)]) pairs.weight[v] = 0.0;
+      if (mandible_found_) return pairs;
+      // What a missing bone would find far away is another.
+      for (int v = 0; v < skull_.boundary_count; ++v) {
+        const bool lower =
+            bone_of(skull_.region[static_cast<std::size_t>(v)]) == SkullBone::mandible;
+        if (lower) pairs.weight[v] = 0.0;
       }
       return pairs;
     }
@@ -267,8 +268,8 @@ class Fit {
   Eigen::VectorXd area_share_;  ///< of each surface vertex, of the outer surface
   std::vector<bool> ridge_;     ///< surface vertices where the template bends most
   SkullState state_;
-  Points3 rest_;                      ///< #V x 3: the bones placed and stretched, not yet bent
-  std::array<bool, 2> bone_found_{};  ///< by SkullBone, when the parts were laid on the input
+  Points3 rest_;                 ///< #V x 3: the bones placed and stretched, not yet bent
+  bool mandible_found_ = false;  ///< when the parts were laid on the input
   FitStages stages_;
   double began_s_ = 0.0;
 };
@@ -344,7 +345,7 @@ Result<FittedSkull> register_skull(const SkullTemplate& skull, const TriangleMes
       fit_similarity(skull.vertices.topRows(skull.boundary_count),
                      fitted.vertices.topRows(skull.boundary_count), {}, FitScale::to_target);
   fitted.input_from_template = similarity.value_or(pose);
-  if (!parts.bone_found[1] || fitted.quality.mandible_observed_share < 0.2) {
+  if (!parts.mandible_found || fitted.quality.mandible_observed_share < 0.2) {
     fitted.warnings.push_back("no mandible in the input: it lies where the cranium puts it");
   }
   if (fitted.quality.observed_share < 0.6) {
