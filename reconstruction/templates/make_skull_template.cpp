@@ -11,9 +11,9 @@
 #include "reconstruction/phantom/canonical_skull.h"
 #include "reconstruction/phantom/skull_landmarks.h"
 #include "reconstruction/registration/surface_places.h"
+#include "reconstruction/rendering/outside.h"
 #include "reconstruction/templates/distance_grid.h"
 #include "reconstruction/templates/make_templates.h"
-#include "reconstruction/rendering/outside.h"
 #include "reconstruction/templates/skull_regions.h"
 #include "reconstruction/templates/tetrahedralization.h"
 
