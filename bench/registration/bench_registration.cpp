@@ -4,7 +4,7 @@
 //   bench_registration heads  TEMPLATE [N = 20] [seed = 1000]
 //   bench_registration led-heads TEMPLATE [N = 20] [seed = 1000]   heads led by their skulls
 //   bench_registration mesh   TEMPLATE SKULL.ply...              real skulls
-//   bench_registration poses  TEMPLATE [N = 100] [SKULL.ply...]  global registration alone
+//   bench_registration poses  TEMPLATE [N = 100] [SKULL.ply...]  poses alone, as fits begin with
 // TEMPLATE is a file made by `skullstation template build`.
 
 #include <fmt/format.h>
@@ -22,10 +22,10 @@
 #include "core/units.h"
 #include "reconstruction/io/mesh_file.h"
 #include "reconstruction/phantom/person.h"
-#include "reconstruction/registration/global_registration.h"
 #include "reconstruction/registration/head_led_by_skull.h"
 #include "reconstruction/registration/head_registration.h"
 #include "reconstruction/registration/skull_registration.h"
+#include "reconstruction/registration/surface_pose.h"
 #include "reconstruction/templates/template_file.h"
 
 namespace skullstation {
@@ -258,12 +258,13 @@ TriangleMesh broken(const TriangleMesh& mesh, const Eigen::Vector3d& normal, dou
 /// Poses found within 5 deg and 5 mm of where the whole skull in its own pose is found.
 void bench_poses_of(const std::string& name, const TriangleMesh& mesh, const TriangleMesh& surface,
                     int poses, double missing) {
-  GlobalRegistrationOptions options;
-  const auto reference = register_globally(mesh, surface, options);
+  SurfacePoseOptions options;
+  const auto reference = find_surface_pose(surface, mesh, options);
   if (!reference) {
     fmt::print("| {} | {} |\n", name, reference.error().message());
     return;
   }
+  const Similarity3 template_from_mesh = reference->inverse();
   Random random(17);
   int found = 0;
   double most_seconds = 0.0;
@@ -276,13 +277,12 @@ void bench_poses_of(const std::string& name, const TriangleMesh& mesh, const Tri
         moved(pose, missing > 0.0 ? broken(mesh, direction.normalized(), missing) : mesh);
     const Seconds start = Seconds::now();
     options.seed = static_cast<std::uint64_t>(i) + 1;
-    const auto fit = register_globally(part, surface, options);
+    const auto fit = find_surface_pose(surface, part, options);
     most_seconds = std::max(most_seconds, (Seconds::now() - start).processor);
     if (!fit) continue;
-    const Similarity3 own = fit->target_from_source * pose;
-    const double angle =
-        degrees(own.rotation.angularDistance(reference->target_from_source.rotation));
-    const double shift = (own * center - reference->target_from_source * center).norm();
+    const Similarity3 own = fit->inverse() * pose;
+    const double angle = degrees(own.rotation.angularDistance(template_from_mesh.rotation));
+    const double shift = (own * center - template_from_mesh * center).norm();
     found += angle <= 5.0 && shift <= 5.0 ? 1 : 0;
   }
   fmt::print("| {} | {:.0f} % | {} of {} | {:.2f} | {:.2f} |\n", name, 100.0 * missing, found,
