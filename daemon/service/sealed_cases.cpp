@@ -71,7 +71,8 @@ Result<void> hand_over(CaseStore& store, Outbox& outbox, const std::vector<Targe
 }  // namespace
 
 fs::path package_folder(const CaseStore& store, const Job& seal) {
-  return packages_folder(store) / fmt::format("case-{}-job-{}", seal.case_id, seal.id);
+  const auto place = packages_folder(store) / fmt::format("case-{}-job-{}", seal.case_id, seal.id);
+  return fs::absolute(place).lexically_normal();  // as the outbox knows it
 }
 
 Result<void> hand_over_sealed_cases(CaseStore& store, Outbox& outbox,
