@@ -87,7 +87,7 @@ json xmp_packet(const Exhibit& exhibit, const std::string& title) {
 
 void describe(json& gltf, const Exhibit& exhibit, const std::string& title) {
   gltf["extensionsUsed"].push_back("KHR_xmp_json_ld");
-  gltf["extensions"]["KHR_xmp_json_ld"]["packets"] = {xmp_packet(exhibit, title)};
+  gltf["extensions"]["KHR_xmp_json_ld"]["packets"] = json::array({xmp_packet(exhibit, title)});
   json& asset = gltf["asset"];
   asset["extensions"]["KHR_xmp_json_ld"]["packet"] = 0;
   asset["generator"] = exhibit.made_by;
@@ -145,8 +145,8 @@ Result<void> add_pictures(const fs::path& case_folder, const StagedFolder& stage
   return {};
 }
 
-std::string text_of(const nlohmann::ordered_json& json) {
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+std::string text_of(const nlohmann::ordered_json& document) {
+  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ Json model_json(const ExhibitModel& model) {
 Json in_columns(const nlohmann::json& rows) {
   Json matrix = Json::array();
   for (std::size_t column = 0; column < 4; ++column) {
-    for (std::size_t row = 0; row < 4; ++row) matrix.push_back(rows[row][column]);
+    for (std::size_t row = 0; row < 4; ++row) matrix.push_back(Json(rows[row][column]));
   }
   return matrix;
 }
