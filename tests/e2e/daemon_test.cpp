@@ -105,7 +105,11 @@ class Daemon : public ::testing::Test {
     if (!became) ADD_FAILURE() << "still " << ask("status").dump() << ", not " << wanted;
     return became;
   }
-  json cases() const { return ask("cases")["cases"]; }
+  /// None as long as a daemon that was just started doesn't answer.
+  json cases() const {
+    const json answer = ask("cases");
+    return answer.is_object() ? answer["cases"] : json::array();
+  }
   json job(int case_id, const std::string& step) const {
     const json answer = ask(fmt::format("jobs {}", case_id));
     for (const json& row : answer["jobs"]) {
@@ -279,7 +283,7 @@ TEST_F(Daemon, WhatAnExaminerApprovesIsSealedAndDeliveredThroughKills) {
   }
   ASSERT_TRUE(skullstation::testing::comes_true([&] {
     const json all = cases();
-    return all.is_array() && !all.empty() && all[0].contains("verified");
+    return !all.empty() && all[0].contains("verified");
   }));
   EXPECT_EQ(sealed_by(), "dr.bone");
   end();
