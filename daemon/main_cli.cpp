@@ -68,6 +68,13 @@ void add_evidence_commands(CLI::App& app, Command& chosen) {
         package.add_option("--audit-log", o.audit_log, "file (default: the configuration's)");
         package.add_option("--by", o.by, "who seals it (default: this user)");
       });
+  add<ExhibitCommand>(
+      app, "exhibit", "show a package's models: glTF with metadata, Voyager scene, IIIF manifest",
+      chosen, [](CLI::App& exhibit, ExhibitCommand& o) {
+        exhibit.add_option("PACKAGE", o.package, "the package's folder")->required();
+        exhibit.add_option("--out", o.out, "folder, new")->required();
+        exhibit.add_option("--config", o.config, "station.toml: its [museum]");
+      });
   add<VerifyCommand>(app, "verify", "is a package as it was sealed? Needs nothing but the package",
                      chosen, [](CLI::App& verify, VerifyCommand& o) {
                        verify.add_option("PACKAGE", o.package, "the package's folder")->required();

@@ -11,9 +11,11 @@
 
 #include "daemon/cli/terminal.h"
 #include "daemon/delivery/outbox_loop.h"
+#include "daemon/http/audit_trail.h"
 #include "daemon/http/console_server.h"
 #include "daemon/service/control_commands.h"
 #include "daemon/service/control_socket.h"
+#include "daemon/service/sealed_cases.h"
 #include "daemon/service/station_service.h"
 
 namespace {
@@ -80,9 +82,9 @@ void print_address(const ConsoleServer& console, const std::string& address) {
              console.setup_code());
 }
 
-/// Nothing where packages go nowhere.
-Result<std::unique_ptr<OutboxLoop>> start_outbox(const StationConfig& config) {
-  if (config.delivery.targets.empty()) return std::unique_ptr<OutboxLoop>();
+/// Sends what has been sealed.
+Result<std::unique_ptr<OutboxLoop>> start_outbox(StationService& service) {
+  const StationConfig& config = service.config();
   auto sender = sender_options(config.delivery.targets, config.evidence.audit_log,
                                config.evidence.keys_folder, config.station_id, "skullstationd");
   if (!sender) return forward(sender);
@@ -90,7 +92,10 @@ Result<std::unique_ptr<OutboxLoop>> start_outbox(const StationConfig& config) {
     fmt::print(stderr, "delivery {} of {} to {}: {}{}\n", d.id, d.case_number, d.target,
                to_string(d.state), d.last_error ? ", " + *d.last_error : "");
   };
-  return OutboxLoop::start(config.delivery.folder, *std::move(sender));
+  return std::make_unique<OutboxLoop>(service.outbox(), *std::move(sender), [&service] {
+    return hand_over_sealed_cases(service.store(), service.outbox(),
+                                  service.config().delivery.targets);
+  });
 }
 
 Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
@@ -98,6 +103,11 @@ Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
   if (!service_with) return forward(service_with);
   const auto service = StationService::open(*service_with);
   if (!service) return forward(service);
+  if (const auto keys = keys_in(service_with->config.evidence.keys_folder,
+                                service_with->config.station_id, SystemClock());
+      !keys) {
+    return forward(keys);
+  }
   const std::filesystem::path socket =
       std::filesystem::path(service_with->config.storage.folder) / "control";
   const auto control = ControlSocket::open(
@@ -110,7 +120,7 @@ Result<void> serve(const DaemonOptions& options, const std::stop_token& stop) {
     console = *std::move(opened);
     print_address(*console, service_with->config.http.address);
   }
-  const auto outbox = start_outbox(service_with->config);
+  const auto outbox = start_outbox(**service);
   if (!outbox) return forward(outbox);
   fmt::print(stderr, "station {}: cases in {}\n", service_with->config.station_id,
              service_with->config.storage.folder);

@@ -206,6 +206,14 @@ struct PackageCommand {
 };
 Result<CommandReport> run(const PackageCommand&, const CommonOptions&, const Progress&);
 
+/// A sealed package's models and pictures as a museum shows them.
+struct ExhibitCommand {
+  std::filesystem::path package;
+  std::filesystem::path out;
+  std::filesystem::path config;  ///< its [museum]; empty: nothing is said of rights, no manifest
+};
+Result<CommandReport> run(const ExhibitCommand&, const CommonOptions&, const Progress&);
+
 /// Is a package as it was sealed?
 struct VerifyCommand {
   std::filesystem::path package;

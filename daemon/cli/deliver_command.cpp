@@ -7,6 +7,7 @@
 #include "core/nearest_word.h"
 #include "daemon/cli/commands.h"
 #include "daemon/delivery/delivery.h"
+#include "daemon/delivery/delivery_json.h"
 #include "daemon/evidence/package_check.h"
 #include "daemon/station/station_config.h"
 
@@ -27,24 +28,6 @@ Result<TargetConfig> target_named(const StationConfig& config, const std::string
               names.empty()  ? "add it as [[delivery.targets]] (docs/delivery.md)"
               : near.empty() ? fmt::format("known: {}", fmt::join(names, ", "))
                              : fmt::format("did you mean {}?", near));
-}
-
-Json json_of(const Delivery& d) {
-  const auto optional = [](const std::optional<std::string>& text) {
-    return text ? Json(*text) : Json(nullptr);
-  };
-  return {{"id", d.id},
-          {"case", d.case_number},
-          {"target", d.target},
-          {"state", to_string(d.state)},
-          {"attempts", d.attempts},
-          {"package", d.package.string()},
-          {"package_sha256", d.package_sha256},
-          {"created", d.created},
-          {"next_attempt", optional(d.next_time)},
-          {"last_error", optional(d.last_error)},
-          {"delivered", optional(d.delivered)},
-          {"read_back_sha256", optional(d.read_back_sha256)}};
 }
 
 std::string line_of(const Delivery& d) {
@@ -92,7 +75,7 @@ Result<CommandReport> send_now(Outbox& outbox, const SenderOptions& options,
     const auto row = outbox.find(id);
     if (!row) return forward(row);
     report.text += line_of(*row);
-    list.push_back(json_of(*row));
+    list.push_back(delivery_json(*row));
     rows.push_back(*row);
   }
   report.json = Json{{"deliveries", list}}.dump(2, ' ', false, Json::error_handler_t::replace);
@@ -145,11 +128,11 @@ Result<CommandReport> run(const DeliverListCommand& command, const CommonOptions
   Json list = Json::array();
   for (const Delivery& row : *rows) {
     report.text += line_of(row);
-    list.push_back(json_of(row));
+    list.push_back(delivery_json(row));
   }
   report.text += oldest_in_words(*oldest);
   report.json = Json{{"deliveries", list},
-                     {"oldest_undelivered", *oldest ? json_of(**oldest) : Json(nullptr)}}
+                     {"oldest_undelivered", *oldest ? delivery_json(**oldest) : Json(nullptr)}}
                     .dump(2, ' ', false, Json::error_handler_t::replace);
   return report;
 }
@@ -181,7 +164,7 @@ Result<CommandReport> run(const DeliverHoldCommand& command, const CommonOptions
   if (!held) return forward(held);
   CommandReport report;
   report.text = line_of(*held);
-  report.json = json_of(*held).dump(2, ' ', false, Json::error_handler_t::replace);
+  report.json = delivery_json(*held).dump(2, ' ', false, Json::error_handler_t::replace);
   return report;
 }
 

@@ -23,6 +23,7 @@ const Json empty_object = Json::object();
 struct Request {
   JsonObject inputs;
   JsonObject options;
+  JsonObject station;
   std::filesystem::path out;
   CommonOptions common;
 };
@@ -39,7 +40,7 @@ Request request_from(const Json& json, const StepCommand& command, JsonFaults& f
   if (root.text("step") != command.name) {
     root.fault("step", fmt::format("is not \"{}\", the step that was called", command.name));
   }
-  Request request{object("inputs"), object("options"), root.text("out"), {}};
+  Request request{object("inputs"), object("options"), object("station"), root.text("out"), {}};
   request.common.threads = root.integer("threads", 0, 1024);
   request.common.seed =
       static_cast<std::uint64_t>(root.optional_integer("seed", 0, INT64_MAX).value_or(1));
@@ -74,6 +75,18 @@ ApproximateCommand approximate_from(Request& request) {
   return command;
 }
 
+PackageCommand seal_from(Request& request) {
+  PackageCommand command;
+  command.case_folder = request.inputs.text("approximate");
+  command.session = request.inputs.text("scan");
+  command.reconstruction = request.inputs.text("reconstruct");
+  command.out = request.out;
+  command.keys = request.station.text("keys_folder");
+  command.audit_log = request.station.text("audit_log");
+  command.by = request.options.optional_text("approved_by").value_or("skullstationd");
+  return command;
+}
+
 /// Each percent and each new stage as a line.
 Progress told_in_lines(const Progress& progress) {
   const auto shown = std::make_shared<std::pair<int, std::string>>(-1, "");
@@ -93,6 +106,7 @@ Result<CommandReport> make(const Command& command, Request& request, const JsonF
                            const Progress& progress) {
   request.inputs.finish();
   request.options.finish();
+  request.station.finish();
   if (faults.first()) return tl::unexpected(*faults.first());
   return run(command, request.common, told_in_lines(progress));
 }
@@ -111,8 +125,9 @@ Result<CommandReport> run_step(const StepCommand& command, const Progress& progr
   if (command.name == "approximate") {
     return make(approximate_from(request), request, faults, progress);
   }
+  if (command.name == "seal") return make(seal_from(request), request, faults, progress);
   return fail(ErrorKind::usage, "step \"" + command.name + "\"", "is not known",
-              "use one of: reconstruct, approximate");
+              "use one of: reconstruct, approximate, seal");
 }
 
 }  // namespace

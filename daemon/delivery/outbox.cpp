@@ -73,9 +73,11 @@ Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& folder, const Clock
 
 Result<Delivery> Outbox::add(const SealedPackage& package, const std::string& target) {
   const std::string key = sha256_hex(package.sha256 + " " + target);
+  const std::lock_guard lock(mutex_);
   Statement insert = database_.statement(
       "INSERT INTO deliveries (key, package, package_sha256, case_number, target, state, created) "
-      "VALUES (?, ?, ?, ?, ?, 'queued', ?) ON CONFLICT (key) DO NOTHING");
+      "VALUES (?, ?, ?, ?, ?, 'queued', ?) ON CONFLICT (key) DO UPDATE SET package = "
+      "excluded.package");
   insert.bind(key)
       .bind(package.folder.string())
       .bind(package.sha256)
@@ -88,11 +90,14 @@ Result<Delivery> Outbox::add(const SealedPackage& package, const std::string& ta
   return found->front();
 }
 
-Result<std::vector<Delivery>> Outbox::read(const std::string& rest) const {
+Result<std::vector<Delivery>> Outbox::read(const std::string& rest,
+                                           const std::optional<std::string>& value) const {
+  const std::lock_guard lock(mutex_);
   Statement query = database_.statement(
       "SELECT id, package, package_sha256, case_number, target, state, attempts, created, "
       "next_time, last_error, delivered, read_back_sha256 FROM deliveries " +
       rest);
+  if (value) query.bind(*value);
   std::vector<Delivery> rows;
   while (query.next()) {
     Delivery row;
@@ -118,6 +123,10 @@ Result<std::vector<Delivery>> Outbox::read(const std::string& rest) const {
 
 Result<std::vector<Delivery>> Outbox::list() const { return read("ORDER BY id"); }
 
+Result<std::vector<Delivery>> Outbox::of_package(const fs::path& folder) const {
+  return read("WHERE package = ? ORDER BY id", folder.string());
+}
+
 Result<Delivery> Outbox::find(std::int64_t id) const {
   const auto rows = read(fmt::format("WHERE id = {}", id));
   if (!rows) return forward(rows);
@@ -135,6 +144,7 @@ Result<std::optional<Delivery>> Outbox::oldest_undelivered() const {
 Result<Delivery> Outbox::change(std::int64_t id, DeliveryEvent event,
                                 const std::string& more_columns,
                                 const std::optional<std::string>& value) {
+  const std::lock_guard lock(mutex_);
   Transaction transaction(database_);
   const auto row = find(id);
   if (!row) return forward(row);

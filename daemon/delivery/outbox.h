@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,16 +41,20 @@ std::chrono::milliseconds back_off(int attempts, std::uint64_t seed);
 
 /// What has to be delivered and how far it is: `outbox.db` (SQLite, WAL, synchronous FULL) in its
 /// folder. A delivery is known by package and target: the same one is in it once, however often it
-/// is asked for, and none is ever removed. Several processes may use it at once; one sends.
+/// is asked for, and none is ever removed. Several processes may use it at once; one sends. Safe
+/// from any thread.
 class Outbox {
  public:
   static Result<std::unique_ptr<Outbox>> open(const std::filesystem::path& folder,
                                               const Clock& clock);
 
-  /// Takes a delivery in; the one that is there already if it was asked for before.
+  /// Takes a delivery in; the one that is there already if it was asked for before (of which the
+  /// package may lie elsewhere now).
   Result<Delivery> add(const SealedPackage& package, const std::string& target);
   /// All, the oldest first.
   Result<std::vector<Delivery>> list() const;
+  /// Those of the package that lies in this folder, the oldest first.
+  Result<std::vector<Delivery>> of_package(const std::filesystem::path& folder) const;
   Result<Delivery> find(std::int64_t id) const;
   /// The oldest one that is not delivered, whatever its state.
   Result<std::optional<Delivery>> oldest_undelivered() const;
@@ -70,12 +75,14 @@ class Outbox {
  private:
   Outbox(std::filesystem::path folder, const Clock& clock, Database database)
       : folder_(std::move(folder)), clock_(clock), database_(std::move(database)) {}
-  Result<std::vector<Delivery>> read(const std::string& rest) const;
+  Result<std::vector<Delivery>> read(const std::string& rest,
+                                     const std::optional<std::string>& value = {}) const;
   Result<Delivery> change(std::int64_t id, DeliveryEvent event, const std::string& more_columns,
                           const std::optional<std::string>& value);
 
   std::filesystem::path folder_;
   const Clock& clock_;
+  mutable std::recursive_mutex mutex_;  // of the database
   mutable Database database_;
 };
 

@@ -2,29 +2,26 @@
 
 #include <fmt/format.h>
 
-namespace skullstation {
+#include <cstdio>
+#include <utility>
 
-namespace {
+namespace skullstation {
 
 using namespace std::chrono_literals;
 
-const SystemClock& system_clock() {
-  static const SystemClock clock;
-  return clock;
-}
-
-}  // namespace
-
-OutboxLoop::OutboxLoop(std::unique_ptr<Outbox> outbox, SenderOptions options)
-    : outbox_(std::move(outbox)),
+OutboxLoop::OutboxLoop(Outbox& outbox, SenderOptions options, std::function<Result<void>()> take_in)
+    : outbox_(outbox),
       options_(std::move(options)),
+      take_in_(std::move(take_in)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
-Result<std::unique_ptr<OutboxLoop>> OutboxLoop::start(const std::filesystem::path& folder,
-                                                      SenderOptions options) {
-  auto outbox = Outbox::open(folder, system_clock());
-  if (!outbox) return forward(outbox);
-  return std::unique_ptr<OutboxLoop>(new OutboxLoop(*std::move(outbox), std::move(options)));
+/// What cannot be taken in does not keep the rest from being sent.
+Result<void> OutboxLoop::once(const Progress& progress) {
+  const auto taken = take_in_();
+  const auto sent = send_due(outbox_, options_, SystemClock(), progress);
+  if (!sent) return forward(sent);
+  if (!taken) return taken;
+  return take_in_();
 }
 
 void OutboxLoop::run(const std::stop_token& stop) {
@@ -32,12 +29,12 @@ void OutboxLoop::run(const std::stop_token& stop) {
   progress.stop = stop;
   std::string told;  // a fault that stays is told once
   do {
-    const auto sent = send_due(*outbox_, options_, system_clock(), progress);
+    const auto done = once(progress);
     const std::string fault =
-        sent || sent.error().kind == ErrorKind::cancelled ? "" : sent.error().message();
+        done || done.error().kind == ErrorKind::cancelled ? "" : done.error().message();
     if (fault != told && !fault.empty()) fmt::print(stderr, "outbox: {}\n", fault);
     told = fault;
-  } while (SystemClock().sleep_for(10s, stop));
+  } while (SystemClock().sleep_for(1s, stop));
 }
 
 }  // namespace skullstation

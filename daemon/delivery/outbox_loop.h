@@ -1,27 +1,26 @@
 #pragma once
 
-#include <filesystem>
-#include <memory>
+#include <functional>
 #include <thread>
 
 #include "daemon/delivery/delivery.h"
 
 namespace skullstation {
 
-/// Sends what is due, on a thread of its own, every ten seconds until its end; a transfer that is
-/// under way is then interrupted and goes on at the next start.
+/// Sends what is due, on a thread of its own, every second until its end; a transfer that is under
+/// way is then interrupted and goes on at the next start.
 class OutboxLoop {
  public:
-  /// Opens the outbox, makes it where there is none.
-  static Result<std::unique_ptr<OutboxLoop>> start(const std::filesystem::path& folder,
-                                                   SenderOptions options);
+  /// `take_in` is called before and after each sending: what else has to go in, what has arrived.
+  OutboxLoop(Outbox& outbox, SenderOptions options, std::function<Result<void>()> take_in);
 
  private:
-  OutboxLoop(std::unique_ptr<Outbox> outbox, SenderOptions options);
   void run(const std::stop_token& stop);
+  Result<void> once(const Progress& progress);
 
-  std::unique_ptr<Outbox> outbox_;
+  Outbox& outbox_;
   SenderOptions options_;
+  std::function<Result<void>()> take_in_;
   std::jthread thread_;  // last: it uses the others
 };
 

@@ -134,10 +134,9 @@ Result<std::string> write_tags(const PackageContent& content, const SealedFiles&
   return manifest;
 }
 
-AuditEvent audit_event(const PackageSummary& summary, const std::string& who, const fs::path& out) {
+AuditEvent audit_event(const PackageSummary& summary, const std::string& who) {
   return {who, "package", summary.case_number,
-          nlohmann::ordered_json{{"package", out.filename().string()},
-                                 {"files", summary.files},
+          nlohmann::ordered_json{{"files", summary.files},
                                  {"bytes", summary.bytes},
                                  {"tagmanifest_sha256", summary.tag_manifest_sha256}}
               .dump()};
@@ -176,7 +175,7 @@ Result<PackageSummary> write_package(const PackageSource& source, const StationK
   if (audit_log) {
     AuditLogPlace log = *audit_log;
     if (log.station.empty()) log.station = content->station;
-    const auto entry = append_audit_entry(log, audit_event(summary, who, out), keys, clock);
+    const auto entry = append_audit_entry(log, audit_event(summary, who), keys, clock);
     if (!entry) return forward(entry);
     if (const auto written = signatures.write(audit_entry_file, *entry + "\n"); !written) {
       return forward(written);

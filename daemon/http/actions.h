@@ -35,6 +35,8 @@ Response prioritise(Console&, Call&);
 Response approve(Console&, Call&);
 Response retry(Console&, Call&);
 Response cancel_job(Console&, Call&);
+Response retry_delivery(Console&, Call&);
+Response hold_delivery(Console&, Call&);
 Response files(Console&, Call&);
 Response file(Console&, Call&);
 

@@ -47,4 +47,31 @@ Result<std::optional<Approval>> Approvals::of(std::int64_t job) {
   return found;
 }
 
+Result<std::vector<Approval>> Approvals::all() {
+  const std::lock_guard lock(mutex_);
+  std::vector<Approval> found;
+  Statement query =
+      database_.statement("SELECT job, account, time, note FROM approvals ORDER BY job");
+  while (query.next()) {
+    Approval& approval = found.emplace_back();
+    approval.job = query.integer();
+    approval.by = query.text();
+    approval.time = query.text();
+    approval.note = query.text();
+  }
+  if (auto read = query.done(); !read) return forward(read);
+  return found;
+}
+
+Result<void> seal_approved(Approvals& approvals, StationService& service) {
+  const auto all = approvals.all();
+  if (!all) return forward(all);
+  for (const Approval& approval : *all) {
+    const auto sealed = service.seal(approval.job, approval.by);
+    // Made anew since, or deleted: nothing is to be sealed.
+    if (!sealed && sealed.error().kind != ErrorKind::usage) return sealed;
+  }
+  return {};
+}
+
 }  // namespace skullstation

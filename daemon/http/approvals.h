@@ -11,6 +11,7 @@
 #include "core/clock.h"
 #include "core/result.h"
 #include "daemon/database/database.h"
+#include "daemon/service/station_service.h"
 
 namespace skullstation {
 
@@ -33,6 +34,8 @@ class Approvals {
   /// Error (usage): it has been approved.
   Result<void> approve(std::int64_t job, const std::string& by, const std::string& note);
   Result<std::optional<Approval>> of(std::int64_t job);
+  /// The oldest first.
+  Result<std::vector<Approval>> all();
 
  private:
   Approvals(Database database, const Clock& clock)
@@ -42,5 +45,8 @@ class Approvals {
   Database database_;
   const Clock& clock_;
 };
+
+/// Has sealed what was approved and is not: a crash may have come between the two.
+Result<void> seal_approved(Approvals& approvals, StationService& service);
 
 }  // namespace skullstation

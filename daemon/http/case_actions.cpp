@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <charconv>
 
+#include "daemon/delivery/delivery_json.h"
 #include "daemon/http/actions.h"
+#include "daemon/service/sealed_cases.h"
 #include "daemon/service/service_json.h"
 
 namespace skullstation::actions {
@@ -42,13 +44,23 @@ Result<Job> job_in(Console& console, Call& call) {
   return found;
 }
 
+Result<Delivery> delivery_in(Console& console, Call& call) {
+  auto found = console.service.outbox().find(call.number("delivery"));
+  if (!found) return found;
+  call.subject = found->case_number;
+  call.details["delivery"] = found->id;
+  call.details["target"] = found->target;
+  return found;
+}
+
 Response not_found(const Error& error) {
   // The only usage error of a look-up is that there is nothing.
   return error.kind == ErrorKind::usage ? refusal(404, "not_found", error.message())
                                         : refusal(error);
 }
 
-Response outcome(const Result<void>& done) {
+template <class T>
+Response outcome(const Result<T>& done) {
   return done ? json_answer(200, R"({"done":true})") : refusal(done.error());
 }
 
@@ -107,6 +119,16 @@ Response show_case(Console& console, Call& call) {
     if (!approval) return refusal(approval.error());
     json["jobs"].push_back(whole_job(job, *approval));
   }
+  const auto deliveries = deliveries_of(store, console.service.outbox(), row->id);
+  if (!deliveries) return refusal(deliveries.error());
+  json["deliveries"] = Json::array();
+  for (const Delivery& delivery : *deliveries) {
+    json["deliveries"].push_back(delivery_json(delivery));
+  }
+  json["targets"] = Json::array();
+  for (const TargetConfig& target : console.service.config().delivery.targets) {
+    if (target.enabled) json["targets"].push_back(target.name);
+  }
   const auto events = store.events(row->id);
   if (!events) return refusal(events.error());
   json["events"] = Json::array();
@@ -125,9 +147,13 @@ Response rerun(Console& console, Call& call) {
   if (auto faulty = call.faulty()) return *faulty;
   const auto row = case_in(console, call);
   if (!row) return not_found(row.error());
+  if (step == seal_step) {
+    return refusal(409, "not_now", "a result is sealed once; a new one when it is approved");
+  }
   call.details["step"] = step;
   call.details["options"] = *options;
-  const auto job = console.service.store().rerun(row->id, step, options->dump());
+  const auto job =
+      console.service.store().rerun(row->id, step, options->dump(), console.service.chain());
   if (!job) return refusal(job.error());
   console.service.engine().wake();
   return json_answer(201, text_of({{"job", *job}}));
@@ -175,13 +201,14 @@ Response approve(Console& console, Call& call) {
   const std::vector<Job> current = current_jobs(*jobs);
   const auto job = std::ranges::find(current, job_id, &Job::id);
   // What somebody looked at may have been made anew meanwhile.
-  if (job == current.end() || job->step != console.service.chain().back().name ||
-      job->state != JobState::done) {
+  if (job == current.end() || job->step != result_step || job->state != JobState::done) {
     return refusal(409, "not_now", fmt::format("job {} is not this case's present result", job_id));
   }
   call.details["job"] = job_id;
   call.details["note"] = note;
-  return outcome(console.approvals.approve(job_id, call.who.account, note));
+  const auto approved = console.approvals.approve(job_id, call.who.account, note);
+  if (!approved) return refusal(approved.error());
+  return outcome(console.service.seal(job_id, call.who.account));
 }
 
 Response retry(Console& console, Call& call) {
@@ -196,6 +223,18 @@ Response cancel_job(Console& console, Call& call) {
   const auto job = job_in(console, call);
   if (!job) return not_found(job.error());
   return outcome(console.service.engine().cancel(job->id));
+}
+
+Response retry_delivery(Console& console, Call& call) {
+  const auto row = delivery_in(console, call);
+  if (!row) return not_found(row.error());
+  return outcome(console.service.outbox().retry(row->id));
+}
+
+Response hold_delivery(Console& console, Call& call) {
+  const auto row = delivery_in(console, call);
+  if (!row) return not_found(row.error());
+  return outcome(console.service.outbox().hold(row->id));
 }
 
 Response files(Console& console, Call& call) {

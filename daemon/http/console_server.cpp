@@ -28,6 +28,7 @@ Result<std::unique_ptr<ConsoleServer>> ConsoleServer::open(StationService& servi
   auto approvals = Approvals::open(storage / "console.db", clock);
   if (!approvals) return forward(approvals);
   server->approvals_ = *std::move(approvals);
+  if (auto sealed = seal_approved(*server->approvals_, service); !sealed) return forward(sealed);
 
   auto keys = keys_in(config.evidence.keys_folder, config.station_id, clock);
   if (!keys) return forward(keys);

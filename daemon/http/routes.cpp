@@ -46,6 +46,9 @@ constexpr std::array routes{
     Route{"POST", "/cases/{case}/approval", examiner, true, "approve case", approve},
     Route{"POST", "/jobs/{job}/retry", hands, false, "retry job", retry},
     Route{"POST", "/jobs/{job}/cancel", examiner | administrator, false, "cancel job", cancel_job},
+    Route{"POST", "/deliveries/{delivery}/retry", hands, false, "retry delivery", retry_delivery},
+    Route{"POST", "/deliveries/{delivery}/hold", examiner | administrator, false, "hold delivery",
+          hold_delivery},
     Route{"GET", "/jobs/{job}/files", signed_in, false, "", files},
     Route{"GET", "/jobs/{job}/files/{path*}", signed_in, false, "", file},
 

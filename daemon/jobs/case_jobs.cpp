@@ -291,7 +291,7 @@ Result<void> CaseStore::retry(std::int64_t id) {
 }
 
 Result<std::int64_t> CaseStore::rerun(std::int64_t case_id, const std::string& step,
-                                      const std::string& options) {
+                                      const std::string& options, const StepChain& chain) {
   const std::lock_guard lock(mutex_);
   const auto owner = case_of(case_id);
   if (!owner) return forward(owner);
@@ -304,6 +304,8 @@ Result<std::int64_t> CaseStore::rerun(std::int64_t case_id, const std::string& s
   Transaction transaction(database_);
   for (const Job& old : current_jobs(*all)) {
     if (old.step == scan_step) continue;
+    const auto kind = std::ranges::find(chain, old.step, &StepKind::name);
+    if (kind != chain.end() && kind->on_approval) continue;
     const bool stands_on_it = std::ranges::any_of(
         old.inputs, [&](const auto& input) { return anew.contains(input.second); });
     if (old.step != step && !stands_on_it) continue;
@@ -330,11 +332,57 @@ Result<std::int64_t> CaseStore::rerun(std::int64_t case_id, const std::string& s
     return fail(ErrorKind::usage, where, "this case has no such step");
   }
   const std::int64_t first = anew.begin()->second;
+  if (auto set =
+          database_.statement("UPDATE cases SET verified = NULL WHERE id = ?").bind(case_id).done();
+      !set) {
+    return forward(set);
+  }
   if (auto noted = note(case_id, fmt::format("{} appointed anew as job {}", step, first)); !noted) {
     return forward(noted);
   }
   if (auto committed = transaction.commit(); !committed) return forward(committed);
   return first;
+}
+
+Result<std::int64_t> CaseStore::appoint_on_approval(std::int64_t case_id, const StepKind& kind,
+                                                    const std::string& options) {
+  const std::lock_guard lock(mutex_);
+  const auto owner = case_of(case_id);
+  if (!owner) return forward(owner);
+  if (auto kept = check_kept(*owner); !kept) return forward(kept);
+  const auto all = jobs(case_id);
+  if (!all) return forward(all);
+  std::map<std::string, std::int64_t> inputs;
+  for (const Job& job : current_jobs(*all)) {
+    if (std::ranges::find(kind.inputs, job.step) == kind.inputs.end()) continue;
+    if (job.state != JobState::done) {
+      return fail(ErrorKind::usage, job_words(job),
+                  fmt::format("is {}; \"{}\" needs it done", to_string(job.state), kind.name));
+    }
+    inputs[job.step] = job.id;
+  }
+  if (inputs.size() != kind.inputs.size()) {
+    return fail(ErrorKind::usage, fmt::format("case {}", case_id),
+                fmt::format("lacks a step that \"{}\" needs", kind.name));
+  }
+  for (const Job& job : *all) {
+    if (job.step == kind.name && job.inputs == inputs) return job.id;
+  }
+  Transaction transaction(database_);
+  const auto id = appoint(case_id, kind.name, options, inputs);
+  if (!id) return id;
+  if (auto noted = note(case_id, fmt::format("{} appointed as job {}", kind.name, *id)); !noted) {
+    return forward(noted);
+  }
+  if (auto committed = transaction.commit(); !committed) return forward(committed);
+  return id;
+}
+
+Result<std::vector<Job>> CaseStore::unverified(std::string_view step) {
+  return jobs_where(fmt::format("step = '{}' AND state = 'done' AND 0 = ? AND case_id IN "
+                                "(SELECT id FROM cases WHERE verified IS NULL AND removed IS NULL)",
+                                step),
+                    0);
 }
 
 Result<std::vector<double>> CaseStore::past_seconds(const std::string& step,

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <ctime>
 #include <fstream>
+#include <set>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -256,6 +257,7 @@ Result<void> CaseStore::save_scan(std::int64_t case_id, const StepChain& chain) 
     }
     std::map<std::string, std::int64_t> made{{std::string(scan_step), (*scan)->id}};
     for (const StepKind& kind : chain) {
+      if (kind.on_approval) continue;
       std::map<std::string, std::int64_t> inputs;
       for (const std::string& input : kind.inputs) inputs[input] = made.at(input);
       const auto id = appoint(case_id, kind.name, kind.options, inputs);
@@ -447,19 +449,31 @@ Result<void> CaseStore::set_hold(std::int64_t case_id, const std::optional<std::
   return transaction.commit();
 }
 
-Result<void> CaseStore::set_verified(std::int64_t case_id) {
+Result<bool> CaseStore::set_verified(std::int64_t case_id, std::int64_t job_id) {
   const std::lock_guard lock(mutex_);
   if (auto known = case_of(case_id); !known) return forward(known);
+  const auto delivered = job(job_id);
+  if (!delivered) return forward(delivered);
+  const auto all = jobs(case_id);
+  if (!all) return forward(all);
+  std::set<std::int64_t> present;
+  for (const Job& current : current_jobs(*all)) present.insert(current.id);
+  if (!present.contains(job_id) || !std::ranges::all_of(delivered->inputs, [&](const auto& input) {
+        return present.contains(input.second);
+      })) {
+    return false;
+  }
   Transaction transaction(database_);
   if (auto set = database_.statement("UPDATE cases SET verified = ? WHERE id = ?")
                      .bind(now())
                      .bind(case_id)
                      .done();
       !set) {
-    return set;
+    return forward(set);
   }
-  if (auto noted = note(case_id, "delivered and verified"); !noted) return noted;
-  return transaction.commit();
+  if (auto noted = note(case_id, "delivered and verified"); !noted) return forward(noted);
+  if (auto committed = transaction.commit(); !committed) return forward(committed);
+  return true;
 }
 
 Result<std::vector<std::int64_t>> CaseStore::remove_expired(std::chrono::seconds term) {

@@ -112,14 +112,20 @@ class CaseStore {
   /// A job that waits does so no longer. Error (usage): it does not wait.
   Result<void> cancel_waiting(std::int64_t job);
   /// Makes a step anew with these options (JSON), and every later step after it with the options it
-  /// had. What was made before stays. Error (usage): the step is running, or was never appointed.
+  /// had, but for those that the chain leaves to a person's approval. What was made before stays;
+  /// the case is no longer verified. Error (usage): the step is running, or was never appointed.
   Result<std::int64_t> rerun(std::int64_t case_id, const std::string& step,
-                             const std::string& options);
+                             const std::string& options, const StepChain& chain = {});
+  /// Appoints a step that reads the case's present jobs, once for each set of them: another call
+  /// gives the same job. Error (usage): one of them is not done.
+  Result<std::int64_t> appoint_on_approval(std::int64_t case_id, const StepKind& kind,
+                                           const std::string& options);
   Result<void> set_priority(std::int64_t case_id, int priority);
   /// A reason holds the case back from deletion; nothing lets it go.
   Result<void> set_hold(std::int64_t case_id, const std::optional<std::string>& reason);
-  /// Every delivery of it has been verified, now.
-  Result<void> set_verified(std::int64_t case_id);
+  /// Every delivery of what this job made has been verified, now. False, and nothing changes, where
+  /// the case has been made anew since: then something else is to be delivered.
+  Result<bool> set_verified(std::int64_t case_id, std::int64_t job);
 
   // -- the engine's part ------------------------------------------------------------------------
 
@@ -145,6 +151,8 @@ class CaseStore {
   Result<std::vector<Job>> jobs(std::int64_t case_id);
   Result<Job> job(std::int64_t id);
   Result<std::vector<ArtifactFile>> files(std::int64_t job);
+  /// The done jobs of this step whose cases are neither verified nor deleted, the oldest first.
+  Result<std::vector<Job>> unverified(std::string_view step);
   std::filesystem::path blob(const ArtifactFile& file) const { return blobs_.path_of(file.sha256); }
   /// How long the last `most` successful runs of the step took [s]: those with the same options
   /// or, if there are none, all.

@@ -162,7 +162,8 @@ fs::path JobEngine::work_folder(const Job& job) const {
   }
 }
 
-Result<void> JobEngine::prepare(const Job& job, const fs::path& folder) const {
+Result<void> JobEngine::prepare(const Job& job, const StepKind& kind,
+                                const fs::path& folder) const {
   if (auto made = make_writable_folder(folder); !made) return made;
   nlohmann::ordered_json inputs = nlohmann::ordered_json::object();
   for (const auto& [name, from] : job.inputs) {
@@ -175,6 +176,7 @@ Result<void> JobEngine::prepare(const Job& job, const fs::path& folder) const {
       {"step", job.step},
       {"inputs", inputs},
       {"options", nlohmann::json::parse(job.options, nullptr, false)},
+      {"station", nlohmann::json::parse(kind.station, nullptr, false)},
       {"out", (folder / "out").string()},
       {"threads", options_.threads},
       {"seed", options_.seed}};
@@ -191,7 +193,8 @@ StepOutcome JobEngine::execute(const Job& job, const fs::path& folder,
   };
   const StepKind* kind = kind_of(job.step);
   if (kind == nullptr) return failed("this version of the program has no such step");
-  if (auto prepared = prepare(job, folder); !prepared) return failed(prepared.error().message());
+  if (auto prepared = prepare(job, *kind, folder); !prepared)
+    return failed(prepared.error().message());
 
   StepProcess process;
   process.command = options_.step_command;
@@ -279,7 +282,11 @@ void JobEngine::tell_outcome(const Job& job, JobState state) {
   if (state == JobState::failed) tell_(JobNews::case_failed, job.case_id);
   if (state == JobState::done) {
     const auto owner = store_.case_of(job.case_id);
-    if (owner && owner->state == CaseState::done) tell_(JobNews::case_done, job.case_id);
+    const StepKind* kind = kind_of(job.step);
+    const bool asked_for = kind != nullptr && kind->on_approval;  // the result was told before
+    if (owner && owner->state == CaseState::done && !asked_for) {
+      tell_(JobNews::case_done, job.case_id);
+    }
   }
   const auto left = store_.outstanding();
   if (left && left->empty()) tell_(JobNews::all_ended, job.case_id);

@@ -74,7 +74,8 @@ class JobEngine {
   void run(const std::stop_token& stop);
   void make(const Job& job, const std::stop_token& stop);
   std::filesystem::path work_folder(const Job& job) const;
-  Result<void> prepare(const Job& job, const std::filesystem::path& folder) const;
+  Result<void> prepare(const Job& job, const StepKind& kind,
+                       const std::filesystem::path& folder) const;
   StepOutcome execute(const Job& job, const std::filesystem::path& folder,
                       const std::stop_token& stop);
   void tell_outcome(const Job& job, JobState state);

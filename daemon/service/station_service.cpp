@@ -7,10 +7,12 @@
 #include <array>
 #include <cstdio>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/file.h"
 #include "core/session/session.h"
+#include "daemon/service/sealed_cases.h"
 #include "daemon/station/scan_workflow.h"
 
 namespace skullstation {
@@ -21,13 +23,15 @@ namespace {
 
 constexpr auto door_open = "door open";
 
-StepChain chain_of(const JobsConfig& jobs) {
+StepChain chain_of(const JobsConfig& jobs, const EvidenceConfig& evidence) {
   constexpr std::array quality{"draft", "standard", "fine"};
   StepLimits limits;
   limits.memory_bytes = static_cast<std::uint64_t>(jobs.memory_mib) << 20;
   limits.time = std::chrono::minutes(jobs.time_limit_min);
   limits.cpu_time = 4 * limits.time;
-  return station_chain(quality.at(static_cast<std::size_t>(jobs.quality)), limits);
+  return station_chain(
+      quality.at(static_cast<std::size_t>(jobs.quality)), limits,
+      {evidence.seal == SealTime::approved, evidence.keys_folder, evidence.audit_log});
 }
 
 void sleep_for(std::chrono::milliseconds time, const std::stop_token& stop) {
@@ -41,7 +45,10 @@ Result<std::unique_ptr<StationService>> StationService::open(const ServiceOption
   auto store = CaseStore::open(options.config.storage.folder, service->clock_, options.version);
   if (!store) return forward(store);
   service->store_ = *std::move(store);
-  service->chain_ = chain_of(options.config.jobs);
+  service->chain_ = chain_of(options.config.jobs, options.config.evidence);
+  auto outbox = Outbox::open(options.config.delivery.folder, service->clock_);
+  if (!outbox) return forward(outbox);
+  service->outbox_ = *std::move(outbox);
   EngineOptions engine;
   engine.chain = service->chain_;
   engine.step_command = options.step_command;
@@ -66,6 +73,25 @@ Result<std::unique_ptr<StationService>> StationService::open(const ServiceOption
 StationService::~StationService() {
   if (station_) station_->hardware.interlock->on_trip({});
   scan_stop_.request_stop();
+}
+
+Result<void> StationService::seal(std::int64_t result_job, const std::string& approved_by) {
+  const auto result = store_->job(result_job);
+  if (!result) return forward(result);
+  const auto jobs = store_->jobs(result->case_id);
+  if (!jobs) return forward(jobs);
+  const auto present = current_jobs(*jobs);
+  if (result->step != result_step ||
+      std::ranges::find(present, result_job, &Job::id) == present.end()) {
+    return fail(ErrorKind::usage, fmt::format("job {}", result_job),
+                "is not its case's present result");
+  }
+  const auto kind = std::ranges::find(chain_, seal_step, &StepKind::name);
+  const auto sealing = store_->appoint_on_approval(
+      result->case_id, *kind, nlohmann::json{{"approved_by", approved_by}}.dump());
+  if (!sealing) return forward(sealing);
+  engine_->wake();
+  return {};
 }
 
 void StationService::tell(StationEvent event, std::optional<StationState> only_in) {
@@ -458,6 +484,9 @@ void StationService::remove_expired() {
     log(removed.error().message());
   } else if (!removed->empty()) {
     log(fmt::format("{} cases were deleted: delivered, verified, expired", removed->size()));
+  }
+  if (const auto swept = remove_packages_of_deleted_cases(*store_); !swept) {
+    log(swept.error().message());
   }
 }
 

@@ -15,6 +15,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "daemon/delivery/outbox.h"
 #include "daemon/jobs/case_store.h"
 #include "daemon/jobs/job_engine.h"
 #include "daemon/service/camera_preview.h"
@@ -80,6 +81,12 @@ class StationService {
 
   CaseStore& store() { return *store_; }
   JobEngine& engine() { return *engine_; }
+  /// Where sealed cases are on their way (sealed_cases.h).
+  Outbox& outbox() { return *outbox_; }
+  /// Has a case sealed with this result of it, in the name of who approved that; once, however
+  /// often it is asked for. Error (usage): it is not its case's present result, or its files were
+  /// deleted.
+  Result<void> seal(std::int64_t result_job, const std::string& approved_by);
   const StepChain& chain() const { return chain_; }
   const StationConfig& config() const { return options_.config; }
   const std::string& version() const { return options_.version; }
@@ -116,6 +123,7 @@ class StationService {
   SystemClock clock_;
   StepChain chain_;
   std::unique_ptr<CaseStore> store_;
+  std::unique_ptr<Outbox> outbox_;
 
   mutable std::mutex mutex_;  // guards what follows, up to the threads
   std::condition_variable_any changed_;

@@ -230,6 +230,12 @@ std::vector<Error> invalid_values(const StationConfig& config) {
       complain(key + ".name", fmt::format("\"{}\" is used twice", target.name));
     }
   }
+  for (const auto& [key, url] : {std::pair("museum.rights_url", config.museum.rights_url),
+                                 std::pair("museum.base_url", config.museum.base_url)}) {
+    if (!url.empty() && !url.starts_with("https://") && !url.starts_with("http://")) {
+      complain(key, "must be an address that begins with https:// or http://");
+    }
+  }
   if (config.storage.folder.empty()) complain("storage.folder", "must name a folder");
   if (config.storage.keep_days < 0) complain("storage.keep_days", "must be 0 or more");
   if (config.jobs.memory_mib < 256) complain("jobs.memory_mib", "must be at least 256");
@@ -293,6 +299,8 @@ void visit_config(StationConfig& config, ConfigFields& fields) {
                  "what packages and the audit log are signed with (skullstation keys create)");
     fields.field("audit_log", config.evidence.audit_log,
                  "file of the station's audit log; empty: none is kept");
+    fields.field("seal", config.evidence.seal, {"approved", "built"},
+                 "when skullstationd seals and delivers a case: once it is approved, or at once");
   });
   fields.table("delivery", [&] {
     fields.field("folder", config.delivery.folder, "of the outbox");
@@ -300,6 +308,15 @@ void visit_config(StationConfig& config, ConfigFields& fields) {
         "targets", config.delivery.targets.size(),
         [&](std::size_t count) { config.delivery.targets.assign(count, TargetConfig{}); },
         [&](std::size_t i) { visit_target(config.delivery.targets[i], fields); });
+  });
+  fields.table("museum", [&] {
+    fields.field("holder", config.museum.holder, "institution that exhibits name");
+    fields.field("rights", config.museum.rights, "sentence in every exhibited model");
+    fields.field("rights_url", config.museum.rights_url,
+                 "licence: an address at creativecommons.org or rightsstatements.org");
+    fields.field("base_url", config.museum.base_url,
+                 "https address of the folder that exhibits are served from; empty: no IIIF "
+                 "manifests");
   });
   fields.table("storage", [&] {
     fields.field("folder", config.storage.folder, "where skullstationd keeps its cases");

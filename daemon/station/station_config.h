@@ -67,9 +67,24 @@ struct SimulationConfig {
   SimulatedFaults faults;
 };
 
+/// When skullstationd seals a case and puts it into the outbox.
+enum class SealTime {
+  approved,  ///< once an examiner has approved the result
+  built,     ///< at once, at a station without an examiner
+};
+
 struct EvidenceConfig {
   std::string keys_folder = "keys";
   std::string audit_log;  ///< file; empty: none is kept
+  SealTime seal = SealTime::approved;
+};
+
+/// What `skullstation exhibit` says of whose things it shows.
+struct MuseumConfig {
+  std::string holder;
+  std::string rights;
+  std::string rights_url;
+  std::string base_url;  ///< where exhibits are served; empty: no IIIF manifests
 };
 
 /// Where sealed packages go (docs/delivery.md).
@@ -126,6 +141,7 @@ struct StationConfig {
   SimulationConfig simulation;
   EvidenceConfig evidence;
   DeliveryConfig delivery;
+  MuseumConfig museum;
   StorageConfig storage;
   JobsConfig jobs;
   HttpConfig http;

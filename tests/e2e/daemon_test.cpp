@@ -18,6 +18,7 @@
 #include "core/file.h"
 #include "core/random.h"
 #include "tests/e2e/small_station.h"
+#include "tests/support/https_client.h"
 #include "tests/support/process.h"
 #include "tests/support/steps.h"
 #include "tests/support/temporary_folder.h"
@@ -50,14 +51,15 @@ class Daemon : public ::testing::Test {
   }
 
   /// Writes the configuration: a turntable that is quick in real time.
-  void configure(const std::string& camera = "", const std::string& station = "") {
+  void configure(const std::string& camera = "", const std::string& station = "",
+                 const std::string& extra = "[http]\nenabled = false\n") {
     skullstation::testing::SmallStation small;
     small.views_per_ring = 2;
     small.camera = camera;
     small.extra =
         "[turntable]\nsteps_per_turn = 200\nmax_speed_deg_s = 1000\n"
-        "max_acceleration_deg_s2 = 20000\nmax_jerk_deg_s3 = 2000000\nhome_speed_deg_s = 700\n"
-        "[http]\nenabled = false\n";
+        "max_acceleration_deg_s2 = 20000\nmax_jerk_deg_s3 = 2000000\nhome_speed_deg_s = 700\n" +
+        extra;
     config_ = write_small_station(folder_.path(), small);
     auto text = *read_file(config_);
     text.insert(text.find("[scan]\n") + 7, "settle_ms = 0\n");
@@ -103,7 +105,11 @@ class Daemon : public ::testing::Test {
     if (!became) ADD_FAILURE() << "still " << ask("status").dump() << ", not " << wanted;
     return became;
   }
-  json cases() const { return ask("cases")["cases"]; }
+  /// None as long as a daemon that was just started doesn't answer.
+  json cases() const {
+    const json answer = ask("cases");
+    return answer.is_object() ? answer["cases"] : json::array();
+  }
   json job(int case_id, const std::string& step) const {
     const json answer = ask(fmt::format("jobs {}", case_id));
     for (const json& row : answer["jobs"]) {
@@ -130,6 +136,38 @@ class Daemon : public ::testing::Test {
     }
     EXPECT_EQ(images, views);
     return views;
+  }
+  /// From the lamp to the result: two presses.
+  void scan_one() {
+    ASSERT_TRUE(becomes("ready"));
+    ask("press");
+    ASSERT_TRUE(becomes("turn-over"));
+    ask("press");
+    ASSERT_TRUE(becomes("result"));
+  }
+  /// A folder as a receiver, and a configuration that names it.
+  std::string records_target() const {
+    fs::create_directories(folder_ / "records");
+    return fmt::format(
+        "[[delivery.targets]]\nname = \"records\"\nprotocol = \"folder\"\naddress = \"{}\"\n",
+        (folder_ / "records").string());
+  }
+  /// The one package that has arrived is as it was sealed, by this station; who sealed it.
+  std::string sealed_by() const {
+    std::vector<fs::path> arrived;
+    for (const auto& entry : fs::directory_iterator(folder_ / "records")) {
+      arrived.push_back(entry.path());
+    }
+    EXPECT_EQ(arrived.size(), 1U);
+    if (arrived.size() != 1) return {};
+    const auto check =
+        skullstation::testing::skullstation_cli({"verify", "--json", arrived[0].string(), "--trust",
+                                                 (storage() / "keys/ed25519.pub.pem").string()});
+    EXPECT_EQ(check.exit_code, 0) << check.out;
+    const json shown = json::parse(check.out);
+    EXPECT_EQ(shown["trusted"], true);
+    EXPECT_TRUE(fs::exists(arrived[0] / "data/session/session.json"));
+    return shown["audit_entry"]["who"];
   }
   /// Steps wait as long as this file is there.
   void hold_steps() { std::ofstream(folder_ / "store" / "hold-steps") << "x"; }
@@ -180,6 +218,74 @@ TEST_F(Daemon, FromButtonToResultAndTheNextSpecimenMeanwhile) {
   EXPECT_EQ(views_of(2), 8U);
   ask("hold");  // seen
   ASSERT_TRUE(becomes("ready"));
+  end();
+}
+
+TEST_F(Daemon, WithoutAnExaminerTheButtonAloneSealsAndDelivers) {
+  configure(
+      "", "",
+      "[http]\nenabled = false\n[evidence]\nseal = \"built\"\n[delivery]\n" + records_target());
+  start();
+  scan_one();
+  ASSERT_TRUE(skullstation::testing::comes_true([&] { return cases()[0].contains("verified"); }));
+  EXPECT_EQ(sealed_by(), "skullstationd");
+  end();
+}
+
+TEST_F(Daemon, WhatAnExaminerApprovesIsSealedAndDeliveredThroughKills) {
+  configure("", "", "[http]\nport = 0\n[delivery]\n" + records_target());
+  start();
+  scan_one();
+  const auto told = [&](const std::string& before, const char* end) {
+    const std::string text = daemon_->err_so_far();
+    const std::size_t at = text.find(before) + before.size();
+    return text.substr(at, text.find(end, at) - at);
+  };
+  const std::string port = told("https://localhost:", "/");
+  const std::string from_here =
+      fmt::format("Origin: https://localhost:{}\r\nContent-Type: application/json\r\n", port);
+  testing::HttpsClient client(static_cast<std::uint16_t>(std::stoi(port)));
+  const auto first = client.ask(
+      "POST", "/api/v1/setup", from_here,
+      json{{"code", told("set-up code: ", " ")}, {"name", "root"}, {"password", "correct horse"}}
+          .dump());
+  ASSERT_EQ(first.status, 201) << first.body;
+  std::string cookie;
+  std::string csrf;
+  const auto sign_in = [&](const testing::HttpsAnswer& answer) {
+    cookie = answer.headers.at("set-cookie").substr(0, answer.headers.at("set-cookie").find(';'));
+    csrf = json::parse(answer.body)["csrf"];
+  };
+  const auto post = [&](const std::string& path, const json& body) {
+    return client.ask("POST", "/api/v1" + path,
+                      from_here + fmt::format("Cookie: {}\r\nX-CSRF-Token: {}\r\n", cookie, csrf),
+                      body.dump());
+  };
+  sign_in(first);
+  ASSERT_EQ(
+      post("/accounts", {{"name", "dr.bone"}, {"role", "examiner"}, {"password", "long enough"}})
+          .status,
+      201);
+  sign_in(post("/session", {{"name", "dr.bone"}, {"password", "long enough"}}));
+  std::this_thread::sleep_for(1200ms);
+  EXPECT_TRUE(fs::is_empty(folder_ / "records")) << "nobody has approved it";
+  hold_steps();
+  const auto approved = post("/cases/1/approval", {{"job", job(1, "approximate")["id"]}});
+  ASSERT_EQ(approved.status, 200) << approved.body;
+  ASSERT_TRUE(
+      skullstation::testing::comes_true([&] { return job(1, "seal")["state"] == "running"; }));
+  for (const int ms : {0, 300}) {  // a job that three kills interrupt has failed
+    daemon_->send(SIGKILL);
+    daemon_->wait();
+    release_steps();
+    start();
+    std::this_thread::sleep_for(std::chrono::milliseconds(ms));
+  }
+  ASSERT_TRUE(skullstation::testing::comes_true([&] {
+    const json all = cases();
+    return !all.empty() && all[0].contains("verified");
+  }));
+  EXPECT_EQ(sealed_by(), "dr.bone");
   end();
 }
 

@@ -31,6 +31,7 @@ class Step : public ::testing::Test {
             {"step", name},
             {"inputs", std::move(inputs)},
             {"options", std::move(options)},
+            {"station", json::object()},
             {"out", (folder_ / "out").string()},
             {"threads", 1},
             {"seed", 1}};

@@ -6,6 +6,8 @@
 #include <sys/mount.h>
 #include <sys/stat.h>
 
+#include <functional>
+
 #include "core/file.h"
 #include "core/random.h"
 #include "daemon/delivery/delivery.h"
@@ -109,6 +111,20 @@ class Servers : public ::testing::Test {
     }
     EXPECT_EQ(files, std::ssize(package().files)) << "once, and nothing else";
   }
+  /// Somebody was there before with other bytes under the name of the first object.
+  std::string finds_other_bytes(const TargetConfig& config,
+                                const std::function<void(std::string&)>& change) {
+    DeliveryObject other = objects(config).front();
+    std::string bytes = read_file(other.file).value();
+    change(bytes);
+    other.file = make("other") / other.file.filename();
+    EXPECT_TRUE(write_file_durably(other.file, bytes));
+    other.bytes = bytes.size();
+    other.sha256 = sha256_hex(bytes);
+    const auto put = open_target(config).value()->put(other, {});
+    EXPECT_TRUE(put) << put.error().message();
+    return fails(config, ErrorKind::bad_input);
+  }
   /// Cuts the connection at 20 places, then lets it through.
   void survives_cuts(TargetConfig config, int from, int to, std::size_t most) {
     Random random(42);
@@ -205,8 +221,56 @@ TEST_F(Webdav, ApacheHoldsThePackageOnceThoughSentThreeTimes) {
   for (int time = 0; time < 3; ++time) EXPECT_EQ(arrives(config), "");
   expect_whole_package(folder_ / "dav/in");
   EXPECT_EQ(probe(config, true), "");
-  config.certificate_file = config.key_file = "";
-  EXPECT_THAT(fails(config, ErrorKind::hardware), ::testing::Not(HasSubstr("it was delivered")));
+  change_byte(folder_ / "dav/in" / package().remote_name() / "bag-info.txt", 3, 1);
+  EXPECT_THAT(fails(config, ErrorKind::bad_input), HasSubstr("holds other bytes"));
+}
+
+TEST_F(Webdav, ApacheRefusesWhomItDoesNotKnowAndIsRefusedItself) {
+  need({"/usr/sbin/apache2"});
+  if (IsSkipped()) return;
+  TargetConfig apache = nginx();
+  apache.address = "https://localhost:18445/in";
+  {
+    const auto server = start_apache(folder_.path(), folder_ / "dav");
+    TargetConfig config = apache;
+    config.certificate_file = config.key_file = "";
+    EXPECT_NE(fails(config, ErrorKind::hardware), "it was delivered");
+    config = apache;
+    config.certificate_file = certificates().rogue();
+    config.key_file = certificates().rogue_key();
+    EXPECT_NE(fails(config, ErrorKind::hardware), "it was delivered");
+    config = apache;
+    config.ca_file = certificates().rogue();
+    EXPECT_THAT(fails(config, ErrorKind::hardware), HasSubstr("certificate is not to be trusted"));
+  }
+  EXPECT_THAT(fails(apache, ErrorKind::hardware), HasSubstr("does not answer"));
+  EXPECT_TRUE(fs::is_empty(folder_ / "dav/in"));
+}
+
+TEST_F(Webdav, ConnectionsToApacheThatAreCutLoseAndDoubleNothing) {
+  need({"/usr/sbin/apache2"});
+  if (IsSkipped()) return;
+  const auto server = start_apache(folder_.path(), folder_ / "dav");
+  TargetConfig config = nginx();
+  config.address = "https://localhost:18503/in";
+  survives_cuts(config, 18503, 18445, 2'000'000);
+  expect_whole_package(folder_ / "dav/in");
+}
+
+TEST_F(Webdav, AFullDiskOfApacheWaits) {
+  need({"/usr/sbin/apache2"});
+  if (IsSkipped()) return;
+  if (::mount("none", (folder_ / "dav").c_str(), "tmpfs", 0, "size=256k") != 0) {
+    GTEST_SKIP() << "nothing can be mounted here";
+  }
+  make("dav/in");
+  {
+    const auto server = start_apache(folder_.path(), folder_ / "dav");
+    TargetConfig config = nginx();
+    config.address = "https://localhost:18445/in";
+    EXPECT_NE(fails(config, ErrorKind::hardware), "it was delivered");
+  }
+  ::umount2((folder_ / "dav").c_str(), MNT_DETACH);
 }
 
 class Sftp : public Servers {
@@ -286,6 +350,19 @@ TEST_F(S3, HoldsThePackageOnceThoughSentThreeTimesAndChecksSignatures) {
   EXPECT_THAT(fails(config, ErrorKind::bad_input), HasSubstr("has no such place"));
   config.address = "http://127.0.0.1:19000/case/503";
   EXPECT_THAT(fails(config, ErrorKind::hardware), HasSubstr("HTTP 503"));
+}
+
+TEST_F(S3, OtherBytesUnderTheSameKeyAreFound) {
+  const auto server = start_s3(folder_.path(), "test secret / with + signs");
+  EXPECT_THAT(finds_other_bytes(s3(), [](std::string& bytes) { bytes[0] ^= 1; }),
+              HasSubstr("holds other bytes"));
+}
+
+TEST_F(S3, CutConnectionsLoseAndDoubleNothing) {
+  const auto server = start_s3(folder_.path(), "test secret / with + signs");
+  TargetConfig config = s3();
+  config.address = "http://127.0.0.1:18504/case/in";
+  survives_cuts(config, 18504, 19000, 2'000'000);
 }
 
 class Dicom : public Servers {
@@ -380,6 +457,35 @@ TEST_F(Stow, OrthancBehindNginxHoldsTheStudyOnce) {
   EXPECT_THAT(fails(config, ErrorKind::bad_input), HasSubstr("wants a client certificate"));
 }
 
+TEST_F(Stow, OtherBytesUnderTheSameUidAreFound) {
+  make("dav");
+  const auto orthanc = start_orthanc(folder_.path(), false);
+  const auto server = start_nginx(folder_.path(), folder_ / "dav");
+  EXPECT_THAT(finds_other_bytes(stow(), [](std::string& bytes) { bytes[bytes.size() - 60] ^= 1; }),
+              HasSubstr("holds other bytes"));
+}
+
+TEST_F(Stow, WhoIsNotKnownIsRefusedAndWhoIsDownIsWaitedFor) {
+  make("dav");
+  {
+    const auto server = start_nginx(folder_.path(), folder_ / "dav");  // nobody behind it
+    EXPECT_THAT(fails(stow(), ErrorKind::hardware), HasSubstr("HTTP 502"));
+    TargetConfig config = stow();
+    config.ca_file = certificates().rogue();
+    EXPECT_THAT(fails(config, ErrorKind::hardware), HasSubstr("certificate is not to be trusted"));
+  }
+  EXPECT_THAT(fails(stow(), ErrorKind::hardware), HasSubstr("does not answer"));
+}
+
+TEST_F(Stow, CutConnectionsLoseAndDoubleNothing) {
+  make("dav");
+  const auto orthanc = start_orthanc(folder_.path(), false);
+  const auto server = start_nginx(folder_.path(), folder_ / "dav");
+  TargetConfig config = stow();
+  config.address = "https://localhost:18505/dicom-web";
+  survives_cuts(config, 18505, 18443, 40'000);
+}
+
 class Fhir : public Servers {
  protected:
   void SetUp() override { need({"/usr/bin/python3"}); }
@@ -401,6 +507,25 @@ TEST_F(Fhir, HoldsThePersonAndTheDocumentsOnce) {
   TargetConfig config = fhir();
   config.secret = secret("wrong");
   EXPECT_THAT(fails(config, ErrorKind::bad_input), HasSubstr("refuses access"));
+}
+
+TEST_F(Fhir, OtherDocumentsUnderTheSameIdentifierAreFound) {
+  const auto server = start_fhir(folder_.path(), "token-1234");
+  EXPECT_THAT(finds_other_bytes(fhir(),
+                                [](std::string& bundle) {
+                                  const std::string words = "Sealed evidence package";
+                                  const auto at = bundle.find(words);
+                                  ASSERT_NE(at, std::string::npos);
+                                  bundle.replace(at, words.size(), "Something else entirely");
+                                }),
+              HasSubstr("holds other bytes"));
+}
+
+TEST_F(Fhir, CutConnectionsLoseAndDoubleNothing) {
+  const auto server = start_fhir(folder_.path(), "token-1234");
+  TargetConfig config = fhir();
+  config.address = "http://127.0.0.1:18506/fhir";
+  survives_cuts(config, 18506, 19001, 20'000);
 }
 
 TEST_F(Fhir, WhatTheServerSaysOfAMistakeIsPassedOn) {

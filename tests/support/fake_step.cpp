@@ -49,6 +49,17 @@ void claim(const std::string& file) {
   }
 }
 
+fs::path input_folder(const Json& request, const char* input) {
+  return request["inputs"][input].get<std::string>();
+}
+
+std::string sha256(const fs::path& file) {
+  char sum[65] = {};
+  std::FILE* tool = ::popen(("sha256sum " + file.string()).c_str(), "r");
+  if (tool == nullptr || std::fread(sum, 1, 64, tool) != 64 || ::pclose(tool) != 0) std::exit(4);
+  return sum;
+}
+
 void eat_memory() {
   std::vector<char*> blocks;
   for (;;) {
@@ -98,6 +109,13 @@ int main(int count, char** words) {
       std::_Exit(0);
     }
   }
+  // Of a true session a true package is made.
+  if (name == "seal" && fs::exists(input_folder(request, "scan") / "session.json")) {
+    const std::string program =
+        (fs::read_symlink("/proc/self/exe").parent_path() / "skullstation").string();
+    ::execl(program.c_str(), program.c_str(), "step", "seal", folder.c_str(), nullptr);
+    return 4;
+  }
   fs::create_directories(out);
   if (what == "garbage") {
     for (int i = 0; i < 1000; ++i) std::printf("\xff\x00\x01{]garbage %d", i);
@@ -122,10 +140,23 @@ int main(int count, char** words) {
     text += ::socket(AF_INET6, SOCK_DGRAM, 0) < 0 ? ", none at all" : ", some";
   }
   if (name == "reconstruct") {
-    for (const char* file : {"skull.ply", "cameras.json", "quality.json"}) write(out / file, text);
+    write(out / "skull.ply", text);
+    write(out / "quality.json", R"({"format": "skullstation-reconstruction-quality/1"})");
+    write(out / "cameras.json", content(input_folder(request, "scan") / "session.json"));
   }
   if (name == "approximate") {
-    for (const char* file : {"case.json", "head.ply", "report.html"}) write(out / file, text);
+    const std::string skull = sha256(input_folder(request, "reconstruct") / "skull.ply");
+    const Json record = {{"format", "skullstation-case/1"},
+                         {"input", {{"file", "skull.ply"}, {"sha256", skull}}}};
+    write(out / "case.json", record.dump());
+    for (const char* file : {"head.ply", "report.html"}) write(out / file, text);
+  }
+  if (name == "seal") {
+    fs::create_directories(out / "signature");
+    for (const char* file :
+         {"bagit.txt", "manifest-sha256.txt", "tagmanifest-sha256.txt", "signature/ed25519.sig"}) {
+      write(out / file, text);
+    }
   }
   write(out / "made.txt", text + std::string(options.value("bytes", std::size_t{0}), 'x'));
   write(folder / "result.json", "{\"letters\": " + std::to_string(text.size()) + "}");

@@ -60,6 +60,8 @@ bool Process::wait_for(std::chrono::milliseconds time) {
   return true;
 }
 
+std::string Process::err_so_far() const { return read_file(folder_ / "err").value_or(""); }
+
 ProcessResult Process::wait() {
   int status = 0;
   if (!ended_ && ::waitpid(pid_, &status, 0) == pid_) take_status(status);

@@ -27,6 +27,8 @@ class Process {
   /// True as soon as it has ended, false after the time.
   bool wait_for(std::chrono::milliseconds time);
   ProcessResult wait();
+  /// What it has written to stderr so far.
+  std::string err_so_far() const;
 
  private:
   void take_status(int status);

@@ -63,11 +63,24 @@ export interface Job {
   error: string;
   log: string;
   ended: string;
+  inputs: Record<string, number>;
   approved?: { by: string; time: string; note: string };
+}
+
+export interface Delivery {
+  id: number;
+  target: string;
+  state: "queued" | "sending" | "waiting" | "rejected" | "held" | "delivered";
+  attempts: number;
+  next_attempt: string | null;
+  last_error: string | null;
+  delivered: string | null;
 }
 
 export interface WholeCase extends Case {
   jobs: Job[];
+  deliveries: Delivery[];
+  targets: string[];
   events: { time: string; what: string }[];
 }
 

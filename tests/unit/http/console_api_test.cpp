@@ -6,6 +6,7 @@
 
 #include "core/file.h"
 #include "daemon/http/event_queue.h"
+#include "daemon/service/sealed_cases.h"
 #include "tests/support/steps.h"
 #include "tests/unit/http/small_console.h"
 
@@ -236,7 +237,13 @@ TEST_F(ConsoleApi, LetsExaminersWork) {
   const std::string approval = fmt::format(R"({{"job":{},"note":"seen"}})", result);
   EXPECT_EQ(send("POST", path + "/approval", approval).status, 200u);
   EXPECT_EQ(send("POST", path + "/approval", approval).status, 409u) << "once";
-  EXPECT_EQ(get(path)["jobs"].back()["approved"]["by"], "examiner");
+  const json sealing = get(path)["jobs"].back();
+  EXPECT_EQ(sealing["step"], "seal");
+  EXPECT_EQ(sealing["options"]["approved_by"], "examiner");
+  EXPECT_EQ(sealing["inputs"]["approximate"], result);
+  EXPECT_EQ(get(path)["jobs"][2]["approved"]["by"], "examiner");
+  ASSERT_TRUE(comes_true([&] { return get(path)["state"] == "done"; }));
+  EXPECT_EQ(send("POST", path + "/rerun", R"({"step":"seal","options":{}})").status, 409u);
 
   EXPECT_EQ(send("POST", path + "/rerun", R"({"step":"none","options":{}})").status, 409u);
   EXPECT_EQ(send("POST", path + "/rerun", R"({"step":"approximate","options":[]})").status, 422u);
@@ -255,6 +262,54 @@ TEST_F(ConsoleApi, LetsExaminersWork) {
     EXPECT_THAT(
         log, HasSubstr(fmt::format(R"("who":"examiner","what":"console: {}","case":"7")", what)));
   }
+}
+
+TEST_F(ConsoleApi, WhatWasApprovedBeforeACrashIsSealedAtTheNextStart) {
+  const auto scanned = finished_case("7");
+  const std::int64_t result = job_of(scanned.id, "approximate");
+  Approvals& approvals = small_.console().approvals;
+  ASSERT_TRUE(approvals.approve(result, "anna", ""));
+  ASSERT_TRUE(approvals.approve(4711, "anna", "of a job that is no more"));
+  EXPECT_EQ(job_of(scanned.id, "seal"), 0);
+  ASSERT_TRUE(seal_approved(approvals, small_.service()));
+  const std::int64_t sealing = job_of(scanned.id, "seal");
+  EXPECT_NE(sealing, 0);
+  ASSERT_TRUE(seal_approved(approvals, small_.service()));
+  EXPECT_EQ(job_of(scanned.id, "seal"), sealing) << "once";
+}
+
+TEST_F(ConsoleApi, ShowsDeliveriesAndLetsThemBeRetriedAndHeld) {
+  const auto scanned = finished_case("7");
+  const std::string path = fmt::format("/cases/{}", scanned.id);
+  EXPECT_TRUE(get(path)["deliveries"].empty());
+  EXPECT_EQ(get(path)["targets"], json::array({"records"}));
+  const std::int64_t result = job_of(scanned.id, "approximate");
+  ASSERT_TRUE(small_.service().seal(result, "anna"));
+  SealedPackage package;
+  Job sealing;
+  sealing.id = job_of(scanned.id, "seal");
+  sealing.case_id = scanned.id;
+  package.folder = package_folder(small_.service().store(), sealing);
+  package.case_number = "7";
+  package.sha256 = std::string(64, 'a');
+  Outbox& outbox = small_.service().outbox();
+  const auto row = outbox.add(package, "records");
+  ASSERT_TRUE(row);
+  json shown = get(path)["deliveries"];
+  ASSERT_EQ(shown.size(), 1u);
+  EXPECT_EQ(shown[0]["target"], "records");
+  EXPECT_EQ(shown[0]["state"], "queued");
+  EXPECT_TRUE(shown[0]["last_error"].is_null());
+
+  const std::string of = fmt::format("/deliveries/{}", row->id);
+  EXPECT_EQ(send("POST", of + "/retry", "", "operator").status, 409u) << "it goes anyway";
+  EXPECT_EQ(send("POST", of + "/hold").status, 200u);
+  EXPECT_EQ(get(path)["deliveries"][0]["state"], "held");
+  EXPECT_EQ(send("POST", of + "/retry", "", "operator").status, 200u);
+  EXPECT_EQ(get(path)["deliveries"][0]["state"], "queued");
+  EXPECT_EQ(send("POST", "/deliveries/77/retry").status, 404u);
+  EXPECT_THAT(small_.audit_log(),
+              HasSubstr(R"("who":"examiner","what":"console: hold delivery","case":"7")"));
 }
 
 TEST_F(ConsoleApi, KeepsAccounts) {

@@ -42,6 +42,8 @@ const std::map<std::string, std::string> expected = {
     {"POST /cases/{case}/approval", "e"},
     {"POST /jobs/{job}/retry", "oea"},
     {"POST /jobs/{job}/cancel", "ea"},
+    {"POST /deliveries/{delivery}/retry", "oea"},
+    {"POST /deliveries/{delivery}/hold", "ea"},
     {"GET /jobs/{job}/files", "voeau"},
     {"GET /jobs/{job}/files/{path*}", "voeau"},
     {"GET /accounts", "au"},

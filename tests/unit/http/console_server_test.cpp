@@ -27,6 +27,7 @@ ServiceOptions options_in(const std::filesystem::path& folder) {
   options.config.storage.folder = (folder / "store").string();
   options.config.evidence.keys_folder = (folder / "keys").string();
   options.config.evidence.audit_log = (folder / "audit.log").string();
+  options.config.delivery.folder = (folder / "outbox").string();
   options.config.http.port = 0;
   options.config.http.address = "0.0.0.0";
   options.step_command = skullstation::testing::fake_step_command();

@@ -20,6 +20,13 @@ T taken(Result<T> result) {
 SmallConsole::SmallConsole() {
   ServiceOptions options;
   options.config.storage.folder = (folder_ / "store").string();
+  TargetConfig records;
+  records.name = "records";
+  TargetConfig closed;
+  closed.name = "closed";
+  closed.enabled = false;
+  options.config.delivery.targets = {records, closed};
+  options.config.delivery.folder = (folder_ / "outbox").string();
   options.step_command = fake_step_command();
   options.version = "1.2.3";
   service_ = taken(StationService::open(options));

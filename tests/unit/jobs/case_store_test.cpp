@@ -48,6 +48,11 @@ class CaseStoreTest : public ::testing::Test {
   void make_all() {
     while (const auto job = *store_->next_job()) make(*job);
   }
+  void set_verified(std::int64_t case_id) {
+    const auto verified = store_->set_verified(case_id, store_->jobs(case_id)->back().id);
+    ASSERT_TRUE(verified) << verified.error().message();
+    EXPECT_TRUE(*verified);
+  }
   std::vector<std::string> states(std::int64_t case_id) {
     std::vector<std::string> words;
     const auto jobs = *store_->jobs(case_id);
@@ -185,15 +190,15 @@ TEST_F(CaseStoreTest, OnlyWhatWasVerifiedAndExpiredAndIsNotHeldIsDeleted) {
   const auto held = *scan_fake_case(*store_, "held", chain);
   const auto expired = *scan_fake_case(*store_, "expired", chain);
   make_all();
-  ASSERT_TRUE(store_->set_verified(held.id));
+  set_verified(held.id);
   ASSERT_TRUE(store_->set_hold(held.id, "court order 7"));
-  ASSERT_TRUE(store_->set_verified(expired.id));
+  set_verified(expired.id);
   clock_.sleep_for(30h, {});
   const auto building = *scan_fake_case(*store_, "building", chain);
-  ASSERT_TRUE(store_->set_verified(building.id));
+  set_verified(building.id);
   clock_.sleep_for(30h, {});
   const auto young = *scan_fake_case(*store_, "young", {});
-  ASSERT_TRUE(store_->set_verified(young.id));
+  set_verified(young.id);
 
   EXPECT_THAT(*store_->remove_expired(100h), IsEmpty());
   EXPECT_THAT(*store_->remove_expired(24h), ElementsAre(expired.id));
@@ -208,6 +213,45 @@ TEST_F(CaseStoreTest, OnlyWhatWasVerifiedAndExpiredAndIsNotHeldIsDeleted) {
               HasSubstr("its files were deleted on"));
   ASSERT_TRUE(store_->set_hold(held.id, std::nullopt));
   EXPECT_THAT(*store_->remove_expired(24h), ElementsAre(held.id));
+}
+
+TEST_F(CaseStoreTest, AStepOnApprovalIsAppointedOnceForEachResult) {
+  StepChain chain = fake_chain();
+  StepKind third = chain.back();
+  third.name = "third";
+  third.inputs = {"scan", "second"};
+  third.on_approval = true;
+  chain.push_back(third);
+  const auto a = *scan_fake_case(*store_, "a", chain);
+  EXPECT_THAT(states(a.id), ElementsAre("scan done", "first waiting", "second waiting"));
+  EXPECT_THAT(store_->appoint_on_approval(a.id, third, "{}").error().message(),
+              HasSubstr("is waiting; \"third\" needs it done"));
+  make_all();
+  const auto sealing = store_->appoint_on_approval(a.id, third, R"({"by": "x"})");
+  ASSERT_TRUE(sealing) << sealing.error().message();
+  EXPECT_EQ(*store_->appoint_on_approval(a.id, third, R"({"by": "y"})"), *sealing);
+  make_all();
+  EXPECT_EQ(*store_->appoint_on_approval(a.id, third, "{}"), *sealing) << "made is made";
+  EXPECT_EQ(store_->unverified("third")->size(), 1U);
+  EXPECT_TRUE(*store_->set_verified(a.id, *sealing));
+  EXPECT_TRUE(store_->case_of(a.id)->verified);
+  EXPECT_THAT(*store_->unverified("third"), IsEmpty());
+
+  ASSERT_TRUE(store_->rerun(a.id, "second", "{}", chain));
+  EXPECT_FALSE(store_->case_of(a.id)->verified) << "its new result was not delivered";
+  EXPECT_FALSE(*store_->set_verified(a.id, *sealing)) << "that is of the old result";
+  EXPECT_THAT(states(a.id),
+              ElementsAre("scan done", "first done", "second done", "third done", "second waiting"))
+      << "a person approves the new result";
+  make_all();
+  const auto anew = store_->appoint_on_approval(a.id, third, "{}");
+  ASSERT_TRUE(anew);
+  EXPECT_NE(*anew, *sealing);
+  EXPECT_THAT(store_->appoint_on_approval(99, third, "{}").error().message(),
+              HasSubstr("there is no such case"));
+  third.inputs.emplace_back("fourth");
+  EXPECT_THAT(store_->appoint_on_approval(a.id, third, "{}").error().message(),
+              HasSubstr("lacks a step that \"third\" needs"));
 }
 
 TEST_F(CaseStoreTest, TheFolderIsForOneProcess) {

@@ -4,6 +4,7 @@ import { fill, h } from "../dom";
 import { facesPart } from "../faces";
 import { live } from "../live";
 import { field, form, notice, tag } from "../parts";
+import { deliveryPart, onTheirWay } from "./delivery";
 import { bytes, duration, moment, number, t, word } from "../text";
 
 interface CaseFigures {
@@ -13,11 +14,12 @@ interface CaseFigures {
   anatomical_from_input?: number[][];
 }
 
-/** Of each step the job appointed last. */
+/** Of each step the job appointed last; what was made of an older result is not shown beside a newer one. */
 function current(jobs: Job[]): Job[] {
   const last = new Map<string, Job>();
   for (const job of jobs) if ((last.get(job.step)?.id ?? 0) < job.id) last.set(job.step, job);
-  return [...last.values()].sort((a, b) => a.id - b.id);
+  const present = new Set([...last.values()].map((job) => job.id));
+  return [...last.values()].filter((job) => Object.values(job.inputs).every((id) => present.has(id))).sort((a, b) => a.id - b.id);
 }
 
 function stepsPart(whole: WholeCase, who: SignIn, again: () => void): HTMLElement {
@@ -66,8 +68,7 @@ function signOffPart(whole: WholeCase, face: Job | undefined, who: SignIn, again
       ? h("p", { class: "note good" }, t("result.approved", { by: face.approved.by, time: moment(face.approved.time) }), face.approved.note && h("span", {}, ` ${face.approved.note}`))
       : h("p", { class: "soft" }, t("result.not_approved"))),
     done && examiner && !face.approved && form([field(t("result.approve_note"), note)], t("result.approve"), "main", approve),
-    h("h2", {}, t("result.delivery")),
-    h("p", {}, whole.removed ? t("result.removed", { time: moment(whole.removed) }) : whole.verified ? t("result.delivered", { time: moment(whole.verified) }) : t("result.not_delivered")),
+    deliveryPart(whole, who, again),
     whole.hold !== undefined && h("p", { class: "note" }, t("result.held", { reason: whole.hold })),
     examiner && (whole.hold !== undefined ? form([], t("result.let_go"), "", letGo) : h("details", {}, h("summary", {}, t("result.hold")), form([field(t("result.hold_why"), reason)], t("result.hold"), "", hold))),
   );
@@ -110,6 +111,7 @@ export function casePage(place: HTMLElement, who: SignIn, argument: string): () 
   let endFaces = () => {};
   let ended = false;
   let key = "";
+  let moving = false;
 
   async function showFaces(face: Job, skull: Job | undefined): Promise<HTMLElement[]> {
     const { files } = await get<{ files: ArtifactFile[] }>(`/jobs/${face.id}/files`);
@@ -133,6 +135,7 @@ export function casePage(place: HTMLElement, who: SignIn, argument: string): () 
   async function look(): Promise<void> {
     const whole = await get<WholeCase>(`/cases/${argument}`);
     if (ended) return;
+    moving = onTheirWay(whole);
     const jobs = current(whole.jobs);
     const face = jobs.find((job) => job.step === "approximate");
     const skull = jobs.find((job) => job.step === "reconstruct" && job.state === "done");
@@ -155,9 +158,14 @@ export function casePage(place: HTMLElement, who: SignIn, argument: string): () 
     // What somebody is typing must not be taken away.
     if (!below.contains(document.activeElement)) void look().catch(said.bad);
   });
+  // Deliveries are not among the station's news.
+  const timer = window.setInterval(() => {
+    if (moving && !below.contains(document.activeElement)) void look().catch(said.bad);
+  }, 5000);
   void look().catch(said.bad);
   return () => {
     ended = true;
+    clearInterval(timer);
     end();
     endFaces();
   };

@@ -1,0 +1,75 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "daemon/exhibit/exhibit_parts.h"
+
+namespace skullstation {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json in_english(const std::string& text) { return {{"en", Json::array({text})}}; }
+
+Json entry(const std::string& label, const std::string& value) {
+  return {{"label", in_english(label)}, {"value", in_english(value)}};
+}
+
+Json canvas(const std::string& base, const ExhibitPicture& picture) {
+  const std::string id = fmt::format("{}/canvas/{}", base, picture.file);
+  const Json image = {{"id", fmt::format("{}/{}", base, picture.file)},
+                      {"type", "Image"},
+                      {"format", "image/png"},
+                      {"width", picture.width},
+                      {"height", picture.height}};
+  const Json annotation = {{"id", id + "/page/painting"},
+                           {"type", "Annotation"},
+                           {"motivation", "painting"},
+                           {"body", image},
+                           {"target", id}};
+  const Json page = {
+      {"id", id + "/page"}, {"type", "AnnotationPage"}, {"items", Json::array({annotation})}};
+  return {{"id", id},
+          {"type", "Canvas"},
+          {"label", in_english(picture.title)},
+          {"width", picture.width},
+          {"height", picture.height},
+          {"items", Json::array({page})}};
+}
+
+}  // namespace
+
+Json iiif_manifest(const Exhibit& exhibit) {
+  const ExhibitLabel& label = exhibit.label;
+  const std::string base = label.base_url.substr(0, label.base_url.find_last_not_of('/') + 1);
+  Json manifest = {{"@context", "http://iiif.io/api/presentation/3/context.json"},
+                   {"id", base + "/manifest.json"},
+                   {"type", "Manifest"},
+                   {"label", in_english(exhibit.title)}};
+  manifest["metadata"] =
+      Json::array({entry("Case", exhibit.case_number), entry("Scanned by station", exhibit.station),
+                   entry("Made with", exhibit.made_by),
+                   entry("Sealed package (SHA-256)", exhibit.package_sha256)});
+  if (!label.holder.empty()) manifest["metadata"].push_back(entry("Institution", label.holder));
+  if (!label.rights_url.empty()) manifest["rights"] = label.rights_url;
+  std::vector<std::string> notes = exhibit.warnings;
+  if (!label.rights.empty()) notes.insert(notes.begin(), label.rights);
+  if (!notes.empty()) {
+    manifest["requiredStatement"] = {{"label", in_english("To be known")},
+                                     {"value", {{"en", notes}}}};
+  }
+  manifest["rendering"] = Json::array();
+  for (const ExhibitModel& model : exhibit.models) {
+    manifest["rendering"].push_back({{"id", fmt::format("{}/{}", base, model.file)},
+                                     {"type", "Model"},
+                                     {"label", in_english(model.title)},
+                                     {"format", "model/gltf-binary"}});
+  }
+  manifest["items"] = Json::array();
+  for (const ExhibitPicture& picture : exhibit.pictures) {
+    manifest["items"].push_back(canvas(base, picture));
+  }
+  return manifest;
+}
+
+}  // namespace skullstation
