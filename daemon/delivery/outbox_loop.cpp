@@ -17,7 +17,7 @@ OutboxLoop::OutboxLoop(Outbox& outbox, SenderOptions options, std::function<Resu
 
 /// What cannot be taken in does not keep the rest from being sent.
 Result<void> OutboxLoop::once(const Progress& progress) {
-  const auto taken = take_in_();
+  auto taken = take_in_();
   const auto sent = send_due(outbox_, options_, SystemClock(), progress);
   if (!sent) return forward(sent);
   if (!taken) return taken;

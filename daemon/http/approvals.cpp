@@ -67,7 +67,7 @@ Result<void> seal_approved(Approvals& approvals, StationService& service) {
   const auto all = approvals.all();
   if (!all) return forward(all);
   for (const Approval& approval : *all) {
-    const auto sealed = service.seal(approval.job, approval.by);
+    auto sealed = service.seal(approval.job, approval.by);
     // Made anew since, or deleted: nothing is to be sealed.
     if (!sealed && sealed.error().kind != ErrorKind::usage) return sealed;
   }

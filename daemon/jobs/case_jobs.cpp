@@ -369,7 +369,7 @@ Result<std::int64_t> CaseStore::appoint_on_approval(std::int64_t case_id, const 
     if (job.step == kind.name && job.inputs == inputs) return job.id;
   }
   Transaction transaction(database_);
-  const auto id = appoint(case_id, kind.name, options, inputs);
+  auto id = appoint(case_id, kind.name, options, inputs);
   if (!id) return id;
   if (auto noted = note(case_id, fmt::format("{} appointed as job {}", kind.name, *id)); !noted) {
     return forward(noted);
