@@ -159,15 +159,14 @@ Result<void> print_physics(const Options& options) {
     surfaces.push_back(surface->mesh);
     names.push_back(fmt::format("{:>6} {:>6} {:>9.2f}", views->size(), variant.noise_sd, pixel_mm));
   }
-  double common_cm2 = 0.0;
-  const auto common = measure_what_all_hold(surfaces, *truth, options.threads, common_cm2);
+  const auto common = measure_what_all_hold(surfaces, *truth, options.threads);
   if (!common) return forward(common);
   fmt::print(
       "\nthe truth's distance from each, on the {:.0f} cm2 that all of them hold\n{:>6} {:>6} "
       "{:>9} | {:>6} {:>6} {:>6}\n",
-      common_cm2, "views", "noise", "pixel mm", "mean", "median", "P95");
+      common->area_cm2, "views", "noise", "pixel mm", "mean", "median", "P95");
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const CommonMeasures& m = (*common)[i];
+    const GapMeasures& m = common->gaps[i];
     fmt::print("{} | {:>6.3f} {:>6.3f} {:>6.2f}\n", names[i], m.mean_mm, m.median_mm, m.p95_mm);
   }
   return {};

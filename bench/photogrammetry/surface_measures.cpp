@@ -125,9 +125,8 @@ Result<SurfaceMeasures> measure_surface(const TriangleMesh& surface, const Trian
   return measures;
 }
 
-Result<std::vector<CommonMeasures>> measure_what_all_hold(std::span<const TriangleMesh> surfaces,
-                                                          const TriangleMesh& truth, int threads,
-                                                          double& common_cm2) {
+Result<CommonMeasures> measure_what_all_hold(std::span<const TriangleMesh> surfaces,
+                                             const TriangleMesh& truth, int threads) {
   constexpr double most_mm = 2.0;
   const auto samples = sample_surface(truth, 0.5);
   if (!samples) return forward(samples);
@@ -142,17 +141,16 @@ Result<std::vector<CommonMeasures>> measure_what_all_hold(std::span<const Triang
       if (gaps[i] >= most_mm) common[i] = 0;
     });
   }
-  common_cm2 = 0.0;
+  CommonMeasures measures;
   for (std::size_t i = 0; i < samples->size(); ++i) {
-    if (common[i] != 0) common_cm2 += (*samples)[i].area_mm2 / 100.0;
+    if (common[i] != 0) measures.area_cm2 += (*samples)[i].area_mm2 / 100.0;
   }
-  std::vector<CommonMeasures> measures;
   for (const std::vector<double>& gaps : gaps_mm) {
     std::vector<double> held;
     for (std::size_t i = 0; i < gaps.size(); ++i) {
       if (common[i] != 0) held.push_back(gaps[i]);
     }
-    CommonMeasures& m = measures.emplace_back();
+    GapMeasures& m = measures.gaps.emplace_back();
     if (held.empty()) continue;
     std::sort(held.begin(), held.end());
     for (const double gap : held) m.mean_mm += gap / static_cast<double>(held.size());

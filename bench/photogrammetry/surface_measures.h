@@ -35,18 +35,23 @@ struct SurfaceMeasures {
 Result<SurfaceMeasures> measure_surface(const TriangleMesh& surface, const TriangleMesh& truth,
                                         std::span<const StereoView> views, int threads);
 
-/// Distances of the truth, half a millimetre apart, from surfaces: what none of them misses by 2 mm
-/// or more. Each surface's own error is over what it holds, and the worse one may hold less.
-struct CommonMeasures {
+/// Distances of places of the truth from a surface.
+struct GapMeasures {
   double mean_mm = 0.0;
   double median_mm = 0.0;
   double p95_mm = 0.0;
 };
 
-/// One for each surface; `common_cm2` is how much of the truth all of them hold.
-Result<std::vector<CommonMeasures>> measure_what_all_hold(std::span<const TriangleMesh> surfaces,
-                                                          const TriangleMesh& truth, int threads,
-                                                          double& common_cm2);
+/// Surfaces compared on the part of the truth that none of them misses by 2 mm or more: each one's
+/// own error is over what it holds, and the worse one may hold less.
+struct CommonMeasures {
+  double area_cm2 = 0.0;          ///< of the truth: what all hold
+  std::vector<GapMeasures> gaps;  ///< one for each surface
+};
+
+/// Looks at the truth at half a place per square millimetre.
+Result<CommonMeasures> measure_what_all_hold(std::span<const TriangleMesh> surfaces,
+                                             const TriangleMesh& truth, int threads);
 
 /// A fifth of a surface's vertices.
 struct EstimatedAccuracy {

@@ -45,8 +45,8 @@ Points3 head_led_by_skull(const HeadTemplate& head, const SkullTemplate& skull,
     from.row(i) = skull.vertices.row(nodes[static_cast<std::size_t>(i)]);
     to.row(i) = fit.vertices.row(nodes[static_cast<std::size_t>(i)]);
   }
-  // | K  P | of the kernel -r, whose smoothness penalty is negative definite without the affine
-  // part.
+  // Kernel and affine part. -r is the kernel of the thin-plate spline in space: positive definite
+  // on what affine maps leave, so that the smoothing adds to its diagonal.
   Eigen::MatrixXd system = Eigen::MatrixXd::Zero(count + 4, count + 4);
   for (Eigen::Index i = 0; i < count; ++i) {
     system.row(i).head(count) = -(from.rowwise() - from.row(i)).rowwise().norm().transpose();
