@@ -45,4 +45,13 @@ double surface_area(const TriangleMesh& mesh) {
   return area;
 }
 
+Eigen::VectorXd vertex_areas(const TriangleMesh& mesh) {
+  Eigen::VectorXd areas = Eigen::VectorXd::Zero(mesh.vertices.rows());
+  for (Eigen::Index f = 0; f < mesh.triangles.rows(); ++f) {
+    const double third = doubled_area_normal(mesh, f).norm() / 6.0;
+    for (int k = 0; k < 3; ++k) areas[mesh.triangles(f, k)] += third;
+  }
+  return areas;
+}
+
 }  // namespace skullstation

@@ -27,4 +27,7 @@ Points3 vertex_normals(const TriangleMesh& mesh);
 /// Surface area [mm^2].
 double surface_area(const TriangleMesh& mesh);
 
+/// Area around each vertex [mm^2], #V: a third of its triangles'.
+Eigen::VectorXd vertex_areas(const TriangleMesh& mesh);
+
 }  // namespace skullstation

@@ -142,8 +142,11 @@ Result<Report> model_report(const ModelSource& source, const ReportPictureOption
       {"head",
        fmt::format("{} vertices, {} modes", model.head.vertex_count(), model.head.mode_count())},
       {"soft tissue", fmt::format("{} modes", model.tissue.mode_count())},
-      {"joint model", fmt::format("{} variables, shrinkage {:.2f}", model.joint.names.size(),
-                                  model.joint.shrinkage)}};
+      {"joint model", fmt::format("{} variables", model.joint.names.size())}};
+  for (std::size_t b = 1; b < model.joint.blocks.size(); ++b) {
+    rows.emplace_back(fmt::format("{} follows from (penalty)", model.joint.blocks[b]),
+                      told_by(model.joint, b));
+  }
   for (const BandFactor& band : model.bands) {
     rows.emplace_back(fmt::format("{:.0f} % band, {}", 100.0 * band.level, band.region),
                       fmt::format("{:.2f} standard deviations", band.factor));

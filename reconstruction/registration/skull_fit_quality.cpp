@@ -59,22 +59,24 @@ void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
     }
   });
   fitted.observed.assign(observed.begin(), observed.end());
-  int outer = 0;
-  int seen = 0;
-  int mandible = 0;
-  int mandible_seen = 0;
+  const Eigen::VectorXd area = vertex_areas(surface_of(skull, skull.vertices));
+  double outer = 0.0;
+  double seen = 0.0;
+  double mandible = 0.0;
+  double mandible_seen = 0.0;
   for (std::size_t v = 0; v < count; ++v) {
     if (!skull.outer[v]) continue;
-    const bool lower = bone_of(skull.region[v]) == SkullBone::mandible;
-    ++outer;
-    seen += observed[v];
-    mandible += lower ? 1 : 0;
-    mandible_seen += lower ? observed[v] : 0;
+    const double of_all = area[static_cast<Eigen::Index>(v)];
+    const double of_mandible = bone_of(skull.region[v]) == SkullBone::mandible ? of_all : 0.0;
+    outer += of_all;
+    mandible += of_mandible;
+    if (!fitted.observed[v]) continue;
+    seen += of_all;
+    mandible_seen += of_mandible;
   }
   SkullFitQuality& quality = fitted.quality;
-  quality.observed_share = outer > 0 ? static_cast<double>(seen) / outer : 0.0;
-  quality.mandible_observed_share =
-      mandible > 0 ? static_cast<double>(mandible_seen) / mandible : 0.0;
+  quality.observed_share = outer > 0.0 ? seen / outer : 0.0;
+  quality.mandible_observed_share = mandible > 0.0 ? mandible_seen / mandible : 0.0;
 
   const TriangleBvh bvh(surface);
   const auto points = static_cast<int>(input.mesh().vertices.rows());

@@ -198,14 +198,7 @@ class Fit {
   }
 
   static Eigen::VectorXd area_shares(const SkullTemplate& skull) {
-    Eigen::VectorXd area = Eigen::VectorXd::Zero(skull.boundary_count);
-    for (Eigen::Index f = 0; f < skull.boundary.rows(); ++f) {
-      const Eigen::Vector3d a = skull.vertices.row(skull.boundary(f, 0));
-      const Eigen::Vector3d b = skull.vertices.row(skull.boundary(f, 1));
-      const Eigen::Vector3d c = skull.vertices.row(skull.boundary(f, 2));
-      const double third = (b - a).cross(c - a).norm() / 6.0;
-      for (int i = 0; i < 3; ++i) area[skull.boundary(f, i)] += third;
-    }
+    const Eigen::VectorXd area = vertex_areas(surface_of(skull, skull.vertices));
     double outer = 0.0;
     for (int v = 0; v < skull.boundary_count; ++v) {
       if (skull.outer[static_cast<std::size_t>(v)]) outer += area[v];

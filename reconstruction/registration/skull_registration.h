@@ -38,7 +38,7 @@ struct SkullFitQuality {
   FitDistances outer;                ///< all outer vertices of the input, to the fitted surface
   int inverted_tetrahedra = 0;       ///< never more than 0
   double least_scaled_volume = 0.0;  ///< least volume of a tetrahedron in units of its rest volume
-  double observed_share = 0.0;       ///< of the outer template vertices
+  double observed_share = 0.0;       ///< of the template's outer surface
   double mandible_observed_share = 0.0;
 };
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace skullstation {
 
@@ -29,35 +28,6 @@ Result<void> check_duplicates(std::span<const ModelSubject> subjects) {
     }
   }
   return {};
-}
-
-/// The depths of the subject's mirror image: NaN where a corner of the partner was not measured.
-Eigen::VectorXd mirrored_depths(const SkullTemplate& skull, const Eigen::VectorXd& depths) {
-  Eigen::VectorXd result(depths.size());
-  for (Index v = 0; v < depths.size(); ++v) {
-    const SurfacePoint& partner = skull.mirror[static_cast<std::size_t>(v)];
-    double sum = 0.0;
-    for (int k = 0; k < 3; ++k) {
-      if (partner.weights[k] > 0.0) sum += partner.weights[k] * depths[partner.corners[k]];
-    }
-    result[v] = sum;
-  }
-  return result;
-}
-
-/// Both halves of the face teach alike: each subject and its mirror image.
-Result<TissueModel> tissue_of(const SkullTemplate& skull, std::span<const ModelSubject> subjects,
-                              const TissueModelOptions& options) {
-  Eigen::MatrixXd depths(skull.boundary_count, 2 * static_cast<Index>(subjects.size()));
-  for (std::size_t n = 0; n < subjects.size(); ++n) {
-    const auto column = 2 * static_cast<Index>(n);
-    depths.col(column) = subjects[n].tissue_mm;
-    depths.col(column + 1) = mirrored_depths(skull, subjects[n].tissue_mm);
-  }
-  auto model = build_tissue_model(depths, surface_of(skull, skull.vertices), options);
-  // A subject and its mirror image are one subject.
-  if (model) model->count = (model->count.array() + 1) / 2;
-  return model;
 }
 
 /// "gonion left" of the bone belongs to "gonion skin left".
@@ -140,22 +110,17 @@ Result<FaceModel> build_face_model(const SkullTemplate& skull, const HeadTemplat
   model.head = *std::move(head_model);
 
   progress.report(0.3, "tissue");
-  auto tissue = tissue_of(skull, *aligned, options.tissue);
+  auto tissue = population_tissue_model(skull, *aligned, options.tissue);
   if (!tissue) return forward(tissue);
   model.tissue = *std::move(tissue);
-  Eigen::MatrixXd tissue_scores(model.tissue.mode_count(), static_cast<Index>(aligned->size()));
-  for (std::size_t n = 0; n < aligned->size(); ++n) {
-    tissue_scores.col(static_cast<Index>(n)) =
-        tissue_belief(model.tissue, (*aligned)[n].tissue_mm, options.tissue.floor_mm).mean;
-  }
   auto joint =
-      joint_of(model.skull, skulls, model.head, heads, tissue_scores, *aligned, options.joint);
+      joint_of(model.skull, skulls, model.head, heads, model.tissue, *aligned, options.joint);
   if (!joint) return forward(joint);
   model.joint = *std::move(joint);
   model.skin_directions = skin_directions_of(skull, head, *aligned);
 
   const auto left_out =
-      leave_one_out(skull, head, *aligned, options.joint, progress.part(0.5, 1.0));
+      leave_one_out(skull, head, *aligned, model.tissue, options.joint, progress.part(0.5, 1.0));
   if (!left_out) return forward(left_out);
   model.bands = calibrated_bands(head, *left_out);
   if (const auto sound = model.validate(); !sound) return forward(sound);

@@ -8,21 +8,23 @@
 #include "reconstruction/statistics/person_facts.h"
 #include "reconstruction/statistics/population.h"
 #include "reconstruction/statistics/shape_model.h"
+#include "reconstruction/statistics/tissue_model.h"
 
 namespace skullstation {
 
 struct JointScoreOptions {
-  int skull_modes = 12;  ///< that the joint model knows, at most
-  int head_modes = 20;
+  int skull_modes = 40;  ///< that the joint model knows, at most
+  int head_modes = 40;
 
   Result<void> validate() const;
 };
 
-/// Joint model of the subjects' coefficients and facts; `tissue` may be empty (0 rows: no such
-/// variables). A fact takes part if most subjects have it and it varies.
+/// Joint model of the subjects' coefficients and facts: the facts follow from the skull, the soft
+/// tissue from the facts, the head from all. A fact takes part if most subjects have it and it
+/// varies. `skulls` and `heads` are those that the models were built of.
 Result<JointModel> joint_of(const ShapeModel& skull_model, std::span<const Points3> skulls,
                             const ShapeModel& head_model, std::span<const Points3> heads,
-                            const Eigen::MatrixXd& tissue, std::span<const ModelSubject> subjects,
+                            const TissueModel& tissue, std::span<const ModelSubject> subjects,
                             const JointScoreOptions& options);
 
 /// What a joint model foretells of all its variables from the skull's coefficients [SD], as far as

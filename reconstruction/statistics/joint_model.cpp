@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <iterator>
 #include <utility>
 
 namespace skullstation {
@@ -19,13 +19,17 @@ tl::unexpected<Error> bad(std::string what, std::string advice = {}) {
   return fail(ErrorKind::bad_input, "joint model", std::move(what), std::move(advice));
 }
 
+constexpr double kTellsNothing = 1000.0;
+
 struct Moments {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };
 
-Eigen::MatrixXd shrunk(const Eigen::MatrixXd& covariance, double shrinkage) {
-  Eigen::MatrixXd result = (1.0 - shrinkage) * covariance;
+/// A tenth less of each correlation: few subjects span few directions, and what lies in none of
+/// them is not known exactly.
+Eigen::MatrixXd shrunk(const Eigen::MatrixXd& covariance) {
+  Eigen::MatrixXd result = 0.9 * covariance;
   result.diagonal() = covariance.diagonal();
   return result;
 }
@@ -72,80 +76,173 @@ Eigen::VectorXd picked(const Eigen::VectorXd& values, std::span<const int> indic
   return result;
 }
 
-/// Mean and covariance of the subjects for whom `use` is true.
-Moments moments_of(const Eigen::MatrixXd& values, const std::vector<bool>& use, int iterations) {
+/// The variables [begin, begin + count) of a block.
+struct Rows {
+  Index begin = 0;
+  Index count = 0;
+};
+
+/// Subjects with their unknown entries filled in, and what the filling adds to the covariance.
+struct CompletedValues {
+  Eigen::MatrixXd centred;     ///< #variables x #subjects
+  Eigen::VectorXd mean;        ///< #variables
+  Eigen::MatrixXd covariance;  ///< #variables x #variables
+};
+
+CompletedValues completed(const Eigen::MatrixXd& values, const Moments& moments) {
   const Index variables = values.rows();
-  Moments moments{Eigen::VectorXd::Zero(variables), Eigen::MatrixXd::Zero(variables, variables)};
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(variables);
-  Eigen::VectorXd counts = Eigen::VectorXd::Zero(variables);
-  bool complete = true;
+  CompletedValues result;
+  result.centred = values;
+  Eigen::MatrixXd doubt = Eigen::MatrixXd::Zero(variables, variables);
   for (Index n = 0; n < values.cols(); ++n) {
-    if (!use[static_cast<std::size_t>(n)]) continue;
-    for (Index i = 0; i < variables; ++i) {
-      if (std::isnan(values(i, n))) {
-        complete = false;
-        continue;
-      }
-      moments.mean[i] += values(i, n);
-      squares[i] += values(i, n) * values(i, n);
-      counts[i] += 1.0;
-    }
+    const std::vector<int> known = known_entries(values.col(n));
+    if (static_cast<Index>(known.size()) == variables) continue;
+    const Belief belief = conditioned_on(moments, known, picked(values.col(n), known), {});
+    result.centred.col(n) = belief.mean;
+    doubt += belief.covariance;
   }
-  moments.mean.array() /= counts.array().max(1.0);
-  moments.covariance.diagonal() =
-      (squares.array() / counts.array().max(1.0) - moments.mean.array().square()).max(1e-12);
-  const auto subjects = static_cast<double>(std::count(use.begin(), use.end(), true));
-  for (int iteration = 0; iteration < (complete ? 1 : iterations); ++iteration) {
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(variables);
-    Eigen::MatrixXd second = Eigen::MatrixXd::Zero(variables, variables);
-    for (Index n = 0; n < values.cols(); ++n) {
-      if (!use[static_cast<std::size_t>(n)]) continue;
-      const std::vector<int> known = known_entries(values.col(n));
-      if (static_cast<Index>(known.size()) == variables) {
-        sum += values.col(n);
-        second += values.col(n) * values.col(n).transpose();
-        continue;
-      }
-      // A little shrinkage keeps the estimate sound while it settles.
-      const Belief belief = conditioned_on({moments.mean, shrunk(moments.covariance, 1e-3)}, known,
-                                           picked(values.col(n), known), {});
-      sum += belief.mean;
-      second += belief.mean * belief.mean.transpose() + belief.covariance;
-    }
-    moments.mean = sum / subjects;
-    moments.covariance = (second - subjects * moments.mean * moments.mean.transpose()) /
-                         std::max(1.0, subjects - 1.0);
+  result.mean = result.centred.rowwise().mean();
+  result.centred.colwise() -= result.mean;
+  result.covariance = (result.centred * result.centred.transpose() + doubt) /
+                      static_cast<double>(std::max<Index>(1, values.cols() - 1));
+  return result;
+}
+
+/// Each variable on its own, of those who have it.
+Moments independent_moments(const Eigen::MatrixXd& values) {
+  Moments moments{Eigen::VectorXd::Zero(values.rows()),
+                  Eigen::MatrixXd::Zero(values.rows(), values.rows())};
+  for (Index i = 0; i < values.rows(); ++i) {
+    const std::vector<int> known = known_entries(values.row(i).transpose());
+    const Eigen::VectorXd seen = picked(values.row(i).transpose(), known);
+    moments.mean[i] = seen.mean();
+    moments.covariance(i, i) =
+        (seen.array() - seen.mean()).square().sum() / (static_cast<double>(known.size()) - 1.0);
   }
   return moments;
 }
 
-/// Mean squared error of the outputs in units of their variance, each subject predicted without
-/// itself, for each of the candidate shrinkages.
-std::vector<double> errors_left_out(const Eigen::MatrixXd& values, std::span<const int> outputs,
-                                    std::span<const double> shrinkages, int iterations) {
-  std::vector<bool> is_output(static_cast<std::size_t>(values.rows()), false);
-  for (const int output : outputs) is_output[static_cast<std::size_t>(output)] = true;
-  std::vector<double> errors(shrinkages.size(), 0.0);
-  std::vector<bool> use(static_cast<std::size_t>(values.cols()), true);
-  for (Index n = 0; n < values.cols(); ++n) {
-    use[static_cast<std::size_t>(n)] = false;
-    const Moments moments = moments_of(values, use, iterations);
-    use[static_cast<std::size_t>(n)] = true;
-    std::vector<int> inputs;
-    for (const int i : known_entries(values.col(n))) {
-      if (!is_output[static_cast<std::size_t>(i)]) inputs.push_back(i);
-    }
-    for (std::size_t s = 0; s < shrinkages.size(); ++s) {
-      const Belief belief =
-          conditioned_on({moments.mean, shrunk(moments.covariance, shrinkages[s])}, inputs,
-                         picked(values.col(n), inputs), {});
-      for (const int output : outputs) {
-        const double error = values(output, n) - belief.mean[output];
-        if (!std::isnan(error)) errors[s] += error * error / moments.covariance(output, output);
-      }
-    }
+/// The inputs' covariance with each block's penalty on its diagonal.
+Eigen::MatrixXd penalised(const Eigen::MatrixXd& covariance, std::span<const Rows> inputs,
+                          std::span<const double> penalties) {
+  const Index count = inputs.back().begin + inputs.back().count;
+  Eigen::MatrixXd result = covariance.topLeftCorner(count, count);
+  for (std::size_t b = 0; b < inputs.size(); ++b) {
+    result.diagonal().segment(inputs[b].begin, inputs[b].count) *= 1.0 + penalties[b];
   }
-  return errors;
+  return result;
+}
+
+/// Errors of a block (#outputs x #subjects) where each subject is foretold by the others: the
+/// residuals of the ridge regression over 1 - leverage.
+Eigen::MatrixXd errors_left_out(const CompletedValues& subjects, std::span<const Rows> inputs,
+                                Rows outputs, std::span<const double> penalties) {
+  const auto subject_count = static_cast<double>(subjects.centred.cols());
+  const Index count = inputs.back().begin + inputs.back().count;
+  const auto x = subjects.centred.topRows(count);
+  const auto y = subjects.centred.middleRows(outputs.begin, outputs.count);
+  const Eigen::MatrixXd carried =
+      Eigen::LLT<Eigen::MatrixXd>((subject_count - 1.0) *
+                                  penalised(subjects.covariance, inputs, penalties))
+          .solve(x);
+  const Eigen::MatrixXd residuals = y - (y * x.transpose()) * carried;
+  // The mean is learnt as well.
+  const Eigen::ArrayXd leverages =
+      x.cwiseProduct(carried).colwise().sum().transpose().array() + 1.0 / subject_count;
+  return residuals * (1.0 - leverages.min(1.0 - 1e-9)).inverse().matrix().asDiagonal();
+}
+
+/// How much each of the inputs' blocks tells of the outputs; `fixed` ones as they are.
+std::vector<double> chosen_penalties(const CompletedValues& subjects, std::span<const Rows> inputs,
+                                     Rows outputs, const Eigen::VectorXd& weights,
+                                     std::span<const std::optional<double>> fixed) {
+  constexpr std::array candidates = {0.003, 0.01, 0.03, 0.1,  0.3,
+                                     1.0,   3.0,  10.0, 30.0, kTellsNothing};
+  constexpr int most_sweeps = 4;
+  std::vector<double> penalties;
+  for (const std::optional<double>& penalty : fixed) penalties.push_back(penalty.value_or(1.0));
+  for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+    const std::vector<double> before = penalties;
+    for (std::size_t b = 0; b < penalties.size(); ++b) {
+      if (fixed[b]) continue;
+      std::array<double, candidates.size()> errors{};
+      for (std::size_t c = 0; c < candidates.size(); ++c) {
+        penalties[b] = candidates[c];
+        errors[c] = (weights.asDiagonal() * errors_left_out(subjects, inputs, outputs, penalties))
+                        .squaredNorm();
+      }
+      penalties[b] =
+          candidates[static_cast<std::size_t>(std::ranges::min_element(errors) - errors.begin())];
+    }
+    if (penalties == before) break;
+  }
+  return penalties;
+}
+
+struct Chain {
+  Moments moments;
+  Eigen::MatrixXd penalties;  ///< #blocks x #blocks
+};
+
+/// Covariance of what a regression leaves over in subjects whom it has not seen: the residuals'
+/// correlations, and their variances as much larger as errors left out are larger than residuals. A
+/// regression with half as many inputs as subjects thinks far too well of itself.
+Eigen::MatrixXd left_over(const CompletedValues& subjects, std::span<const Rows> inputs,
+                          Rows outputs, std::span<const double> penalties,
+                          const Eigen::MatrixXd& slope) {
+  const auto [begin, count] = outputs;
+  const Eigen::MatrixXd across = subjects.covariance.block(begin, 0, count, begin);
+  const Eigen::MatrixXd residuals =
+      subjects.covariance.block(begin, begin, count, count) - slope * across.transpose() -
+      across * slope.transpose() +
+      slope * subjects.covariance.topLeftCorner(begin, begin) * slope.transpose();
+  const Eigen::ArrayXd seen =
+      (subjects.centred.middleRows(begin, count) - slope * subjects.centred.topRows(begin))
+          .rowwise()
+          .squaredNorm();
+  const Eigen::ArrayXd left_out =
+      errors_left_out(subjects, inputs, outputs, penalties).rowwise().squaredNorm();
+  const Eigen::VectorXd scale = (left_out / seen).sqrt();
+  return scale.asDiagonal() * shrunk(residuals) * scale.asDiagonal();
+}
+
+/// Block after block: y = B x + rest with B = Syx (Sxx + penalties)^-1.
+Chain chained(const CompletedValues& subjects, std::span<const Rows> rows,
+              std::span<const VariableBlock> blocks, std::optional<double> penalty) {
+  Chain chain;
+  const auto block_count = static_cast<Index>(rows.size());
+  chain.penalties = Eigen::MatrixXd::Zero(block_count, block_count);
+  chain.moments.mean = subjects.mean;
+  Eigen::MatrixXd& covariance = chain.moments.covariance;
+  covariance = Eigen::MatrixXd::Zero(subjects.mean.size(), subjects.mean.size());
+  const Index first = rows.front().count;
+  covariance.topLeftCorner(first, first) = shrunk(subjects.covariance.topLeftCorner(first, first));
+  for (std::size_t b = 1; b < rows.size(); ++b) {
+    const std::span<const Rows> inputs = rows.first(b);
+    const auto [begin, count] = rows[b];
+    const Eigen::VectorXd weights =
+        blocks[b].weights.size() > 0 ? blocks[b].weights : Eigen::VectorXd::Ones(count);
+    std::vector<std::optional<double>> fixed(b, penalty);
+    for (std::size_t from = 0; from < b; ++from) {
+      if (std::ranges::count(blocks[b].ignores, blocks[from].name) > 0) fixed[from] = kTellsNothing;
+    }
+    const std::vector<double> penalties =
+        chosen_penalties(subjects, inputs, rows[b], weights, fixed);
+    chain.penalties.row(static_cast<Index>(b)).head(static_cast<Index>(b)) =
+        Eigen::Map<const Eigen::RowVectorXd>(penalties.data(), static_cast<Index>(b));
+    const Eigen::MatrixXd across = subjects.covariance.block(begin, 0, count, begin);
+    const Eigen::MatrixXd slope =
+        Eigen::LLT<Eigen::MatrixXd>(penalised(subjects.covariance, inputs, penalties))
+            .solve(across.transpose())
+            .transpose();
+    const Eigen::MatrixXd rest = left_over(subjects, inputs, rows[b], penalties, slope);
+    const Eigen::MatrixXd follows = slope * covariance.topLeftCorner(begin, begin);
+    covariance.block(begin, 0, count, begin) = follows;
+    covariance.block(0, begin, begin, count) = follows.transpose();
+    const Eigen::MatrixXd own = follows * slope.transpose() + rest;
+    covariance.block(begin, begin, count, count) = 0.5 * (own + own.transpose());
+  }
+  return chain;
 }
 
 }  // namespace
@@ -162,6 +259,10 @@ Result<void> JointModel::validate() const {
       covariance.cols() != variables) {
     return bad("its tables are not of one length");
   }
+  const auto block_count = static_cast<Index>(blocks.size());
+  if (penalties.rows() != block_count || penalties.cols() != block_count) {
+    return bad("its penalties are not of its blocks");
+  }
   if (!mean.allFinite() || !covariance.allFinite()) return bad("a number in it is none");
   if (Eigen::LLT<Eigen::MatrixXd>(covariance).info() != Eigen::Success) {
     return bad("its covariance is not positive definite");
@@ -170,47 +271,49 @@ Result<void> JointModel::validate() const {
 }
 
 Result<void> JointModelOptions::validate() const {
-  if (shrinkage && !(*shrinkage > 0.0 && *shrinkage <= 1.0)) {
-    return bad("shrinkage must be above 0, up to 1");
-  }
+  if (penalty && !(*penalty > 0.0)) return bad("penalty must be above 0");
   if (iterations < 1) return bad("iterations must be at least 1");
   return {};
 }
 
-Result<JointModel> build_joint_model(std::vector<std::string> names, const Eigen::MatrixXd& values,
-                                     std::span<const int> outputs,
+Result<JointModel> build_joint_model(std::span<const VariableBlock> blocks,
+                                     const Eigen::MatrixXd& values,
                                      const JointModelOptions& options) {
   if (const auto sound = options.validate(); !sound) return forward(sound);
-  if (static_cast<Index>(names.size()) != values.rows()) {
-    return bad(fmt::format("{} names for {} variables", names.size(), values.rows()));
+  JointModel model;
+  std::vector<Rows> rows;
+  for (const VariableBlock& block : blocks) {
+    const auto count = static_cast<Index>(block.variables.size());
+    if (count == 0) return bad(fmt::format("block \"{}\" has no variables", block.name));
+    if (block.weights.size() != 0 && block.weights.size() != count) {
+      return bad(fmt::format("block \"{}\" has {} weights for {} variables", block.name,
+                             block.weights.size(), count));
+    }
+    rows.push_back({static_cast<Index>(model.names.size()), count});
+    model.blocks.push_back(block.name);
+    std::ranges::copy(block.variables, std::back_inserter(model.names));
+  }
+  if (model.names.empty() || static_cast<Index>(model.names.size()) != values.rows()) {
+    return bad(fmt::format("{} names for {} variables", model.names.size(), values.rows()));
   }
   if (values.cols() < 4) return bad("needs at least 4 subjects", "add subjects");
-  if (outputs.empty() && !options.shrinkage) return bad("has no output to choose its shrinkage by");
-  const std::vector<bool> all(static_cast<std::size_t>(values.cols()), true);
   for (Index i = 0; i < values.rows(); ++i) {
     const std::vector<int> known = known_entries(values.row(i).transpose());
     const Eigen::VectorXd seen = picked(values.row(i).transpose(), known);
     if (known.size() < 2 || !(seen.maxCoeff() > seen.minCoeff())) {
       return bad(fmt::format("\"{}\" is known in {} subjects and does not vary",
-                             names[static_cast<std::size_t>(i)], known.size()));
+                             model.names[static_cast<std::size_t>(i)], known.size()));
     }
   }
-  JointModel model;
-  model.subjects = static_cast<int>(values.cols());
-  if (options.shrinkage) {
-    model.shrinkage = *options.shrinkage;
-  } else {
-    constexpr std::array candidates = {0.001, 0.003, 0.01, 0.02, 0.05, 0.1, 0.15,
-                                       0.2,   0.3,   0.4,  0.5,  0.65, 0.8, 0.95};
-    const std::vector<double> errors =
-        errors_left_out(values, outputs, candidates, options.iterations);
-    model.shrinkage =
-        candidates[static_cast<std::size_t>(std::ranges::min_element(errors) - errors.begin())];
+  Chain chain{independent_moments(values), {}};
+  const int rounds = values.hasNaN() ? options.iterations : 1;
+  for (int round = 0; round < rounds; ++round) {
+    chain = chained(completed(values, chain.moments), rows, blocks, options.penalty);
   }
-  const Moments moments = moments_of(values, all, options.iterations);
-  model.names = std::move(names);
-  model.mean = moments.mean;
-  model.covariance = shrunk(moments.covariance, model.shrinkage);
+  model.penalties = std::move(chain.penalties);
+  model.mean = std::move(chain.moments.mean);
+  model.covariance = std::move(chain.moments.covariance);
+  model.subjects = static_cast<int>(values.cols());
   return model;
 }
 
@@ -233,6 +336,20 @@ Belief belief_about(const JointModel& model, const Belief& belief,
       result.covariance(i, j) = belief.covariance(variable, other);
   }
   return result;
+}
+
+std::string told_by(const JointModel& model, std::size_t block) {
+  std::string tells;
+  std::string silent;
+  for (std::size_t from = 0; from < block; ++from) {
+    const double penalty = model.penalties(static_cast<Index>(block), static_cast<Index>(from));
+    std::string& list = penalty < kTellsNothing ? tells : silent;
+    if (!list.empty()) list += ", ";
+    list += model.blocks[from];
+    if (penalty < kTellsNothing) list += fmt::format(" ({:g})", penalty);
+  }
+  if (tells.empty()) tells = "nothing";
+  return silent.empty() ? tells : tells + "; nothing by " + silent;
 }
 
 std::vector<std::string> coefficient_names(std::string_view of, Index count) {

@@ -28,6 +28,18 @@ std::vector<Index> sampled_vertices(const Eigen::VectorXd& weights) {
   return sample;
 }
 
+double tissue_error_mm(const TissueModel& tissue, const Eigen::VectorXd& predicted_mm,
+                       const Eigen::VectorXd& truth_mm) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (Index v = 0; v < truth_mm.size(); ++v) {
+    if (!tissue.modelled[static_cast<std::size_t>(v)] || std::isnan(truth_mm[v])) continue;
+    sum += std::abs(predicted_mm[v] - truth_mm[v]);
+    ++count;
+  }
+  return sum / std::max(1.0, count);
+}
+
 /// Signed distance of the predicted from the true vertices along the true normals.
 Eigen::VectorXd along_normals(const Points3& predicted, const Points3& truth,
                               const Points3& normals) {
@@ -38,6 +50,7 @@ Eigen::VectorXd along_normals(const Points3& predicted, const Points3& truth,
 
 Result<std::vector<LeftOut>> leave_one_out(const SkullTemplate& skull, const HeadTemplate& head,
                                            std::span<const ModelSubject> subjects,
+                                           const TissueModel& tissue,
                                            const JointScoreOptions& options,
                                            const Progress& progress) {
   if (const auto sound = options.validate(); !sound) return forward(sound);
@@ -77,24 +90,29 @@ Result<std::vector<LeftOut>> leave_one_out(const SkullTemplate& skull, const Hea
     const auto head_model = build_shape_model(other_heads, head_areas);
     if (!head_model) return forward(head_model);
     const auto joint =
-        joint_of(*skull_model, other_skulls, *head_model, other_heads, {}, others, options);
+        joint_of(*skull_model, other_skulls, *head_model, other_heads, tissue, others, options);
     if (!joint) return forward(joint);
 
     const Points3 normals = vertex_normals({heads[n], head.triangles, {}, {}});
+    const auto errors_of = [&](const Belief& of_head, const Belief& of_tissue) {
+      return ForetoldErrors{
+          along_normals(shape_at(*head_model, of_head.mean), heads[n], normals),
+          sd_along_normals_mm(*head_model, of_head.covariance, normals),
+          tissue_error_mm(tissue, expected_tissue(tissue, of_tissue), subjects[n].tissue_mm)};
+    };
     const Eigen::VectorXd coefficients = coefficients_of(*skull_model, skulls[n]);
-    LeftOut left;
-    left.mean_error_mm = along_normals(unflattened(head_model->mean), heads[n], normals);
     const Belief skull_belief{coefficients,
                               Eigen::MatrixXd::Zero(coefficients.size(), coefficients.size())};
-    const std::vector<std::string> head_names = coefficient_names("head", head_model->mode_count());
-    const auto predict = [&](const PersonFacts& facts, Eigen::VectorXd& error,
-                             Eigen::VectorXd& sd) {
-      const Belief belief = belief_about(*joint, foretold(*joint, skull_belief, facts), head_names);
-      error = along_normals(shape_at(*head_model, belief.mean), heads[n], normals);
-      sd = sd_along_normals_mm(*head_model, belief.covariance, normals);
+    const auto given = [&](const PersonFacts& facts) {
+      const Belief all = foretold(*joint, skull_belief, facts);
+      return errors_of(
+          belief_about(*joint, all, coefficient_names("head", head_model->mode_count())),
+          belief_about(*joint, all, coefficient_names("tissue", tissue.mode_count())));
     };
-    predict({}, left.skull_error_mm, left.skull_sd_mm);
-    predict(subjects[n].facts, left.full_error_mm, left.full_sd_mm);
+    LeftOut left;
+    left.mean = errors_of(population_belief(*head_model), population_tissue(tissue));
+    left.given_skull = given({});
+    left.given_all = given(subjects[n].facts);
     results.push_back(std::move(left));
   }
   return results;
@@ -109,7 +127,8 @@ std::vector<BandFactor> calibrated_bands(const HeadTemplate& head,
       for (std::size_t v = 0; v < head.region.size(); ++v) {
         if (!belongs(head.region[v])) continue;
         const auto at = static_cast<Index>(v);
-        ratios.push_back(std::abs(subject.skull_error_mm[at]) / subject.skull_sd_mm[at]);
+        ratios.push_back(std::abs(subject.given_skull.head_mm[at]) /
+                         subject.given_skull.head_sd_mm[at]);
       }
     }
     if (const auto factor = conformal_factor(ratios, level)) {

@@ -264,7 +264,8 @@ void write_joint(Hdf5Writer& file, const JointModel& joint) {
   file.texts("/joint/names", joint.names);
   file.table("/joint/mean", as_table(joint.mean), StoredNumber::float64);
   file.table("/joint/covariance", as_table(joint.covariance), StoredNumber::float64);
-  file.scalar("/joint/shrinkage", joint.shrinkage, StoredNumber::float64);
+  file.texts("/joint/blocks", joint.blocks);
+  file.table("/joint/penalties", as_table(joint.penalties), StoredNumber::float64);
   file.scalar("/joint/subjects", joint.subjects, StoredNumber::int32);
 }
 
@@ -273,7 +274,8 @@ JointModel read_joint(ModelReader& file) {
   joint.names = file.texts("/joint/names");
   joint.mean = file.vector("/joint/mean");
   joint.covariance = file.matrix("/joint/covariance");
-  joint.shrinkage = file.scalar("/joint/shrinkage");
+  joint.blocks = file.texts("/joint/blocks");
+  joint.penalties = file.matrix("/joint/penalties");
   joint.subjects = static_cast<int>(file.scalar("/joint/subjects"));
   return joint;
 }

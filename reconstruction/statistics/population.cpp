@@ -63,19 +63,21 @@ std::vector<int> observed_outer(const SkullTemplate& skull, const std::vector<bo
   return vertices;
 }
 
-}  // namespace
-
-Eigen::VectorXd vertex_areas(const TriangleMesh& mesh) {
-  Eigen::VectorXd areas = Eigen::VectorXd::Zero(mesh.vertices.rows());
-  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
-    const Eigen::Vector3d a = mesh.vertices.row(mesh.triangles(t, 0));
-    const Eigen::Vector3d b = mesh.vertices.row(mesh.triangles(t, 1));
-    const Eigen::Vector3d c = mesh.vertices.row(mesh.triangles(t, 2));
-    const double third = (b - a).cross(c - a).norm() / 6.0;
-    for (int k = 0; k < 3; ++k) areas[mesh.triangles(t, k)] += third;
+/// The depths of the subject's mirror image: NaN where a corner of the partner was not measured.
+Eigen::VectorXd mirrored_depths(const SkullTemplate& skull, const Eigen::VectorXd& depths) {
+  Eigen::VectorXd result(depths.size());
+  for (Index v = 0; v < depths.size(); ++v) {
+    const SurfacePoint& partner = skull.mirror[static_cast<std::size_t>(v)];
+    double sum = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      if (partner.weights[k] > 0.0) sum += partner.weights[k] * depths[partner.corners[k]];
+    }
+    result[v] = sum;
   }
-  return areas;
+  return result;
 }
+
+}  // namespace
 
 Eigen::VectorXd skull_weights(const SkullTemplate& skull) {
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(skull.vertices.rows());
@@ -127,8 +129,10 @@ Result<std::vector<ModelSubject>> aligned_population(const SkullTemplate& skull,
 }
 
 double observed_share(const SkullTemplate& skull, const std::vector<bool>& observed) {
-  const auto outer = static_cast<double>(std::count(skull.outer.begin(), skull.outer.end(), true));
-  return static_cast<double>(observed_outer(skull, observed).size()) / outer;
+  const Eigen::VectorXd weights = skull_weights(skull);
+  double seen = 0.0;
+  for (const int v : observed_outer(skull, observed)) seen += weights[v];
+  return seen / weights.sum();
 }
 
 Belief skull_belief(const SkullTemplate& skull, const ShapeModel& model, const Points3& vertices,
@@ -189,6 +193,21 @@ void complete_skulls(const SkullTemplate& skull, std::vector<ModelSubject>& subj
   for (ModelSubject* subject : partial) {
     subject->skull = completed_skull(skull, *model, subject->skull, subject->skull_observed);
   }
+}
+
+Result<TissueModel> population_tissue_model(const SkullTemplate& skull,
+                                            std::span<const ModelSubject> subjects,
+                                            const TissueModelOptions& options) {
+  Eigen::MatrixXd depths(skull.boundary_count, 2 * static_cast<Index>(subjects.size()));
+  for (std::size_t n = 0; n < subjects.size(); ++n) {
+    const auto column = 2 * static_cast<Index>(n);
+    depths.col(column) = subjects[n].tissue_mm;
+    depths.col(column + 1) = mirrored_depths(skull, subjects[n].tissue_mm);
+  }
+  auto model = build_tissue_model(depths, surface_of(skull, skull.vertices), options);
+  // A subject and its mirror image are one subject.
+  if (model) model->count = (model->count.array() + 1) / 2;
+  return model;
 }
 
 }  // namespace skullstation

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "reconstruction/registration/skull_template.h"
 #include "reconstruction/statistics/person_facts.h"
 #include "reconstruction/statistics/shape_model.h"
+#include "reconstruction/statistics/tissue_model.h"
 
 namespace skullstation {
 
@@ -22,9 +24,6 @@ struct ModelSubject {
   PersonFacts facts;
 };
 
-/// Area around each vertex [mm^2], a third of its triangles'.
-Eigen::VectorXd vertex_areas(const TriangleMesh& mesh);
-
 /// Weights of the skull template's vertices for statistics: the area round outer surface vertices,
 /// 0 elsewhere.
 Eigen::VectorXd skull_weights(const SkullTemplate& skull);
@@ -37,7 +36,7 @@ Result<std::vector<ModelSubject>> aligned_population(const SkullTemplate& skull,
                                                      const HeadTemplate& head,
                                                      std::vector<ModelSubject> subjects);
 
-/// Share of the template's outer vertices that were observed.
+/// Share of the template's outer surface that was observed.
 double observed_share(const SkullTemplate& skull, const std::vector<bool>& observed);
 
 /// What the observed outer vertices of a fitted skull (#V x 3, aligned) tell about its
@@ -56,5 +55,10 @@ Points3 completed_skull(const SkullTemplate& skull, const ShapeModel& model,
 /// (below 10).
 void complete_skulls(const SkullTemplate& skull, std::vector<ModelSubject>& subjects,
                      double complete_share = 0.9);
+
+/// Tissue of both halves of the face together: each subject teaches with its mirror image.
+Result<TissueModel> population_tissue_model(const SkullTemplate& skull,
+                                            std::span<const ModelSubject> subjects,
+                                            const TissueModelOptions& options = {});
 
 }  // namespace skullstation

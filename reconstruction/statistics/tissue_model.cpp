@@ -303,7 +303,6 @@ Result<void> TissueModelOptions::validate() const {
   if (least_count < 2) return bad("least_count must be at least 2");
   if (!(shrinkage_count >= 0.0)) return bad("shrinkage_count must not be negative");
   if (!(degrees_of_freedom > 0.0)) return bad("degrees_of_freedom must be positive");
-  if (!(floor_mm > 0.0)) return bad("floor_mm must be positive");
   if (iterations < 1) return bad("iterations must be at least 1");
   return {};
 }
@@ -360,7 +359,7 @@ Result<TissueModel> build_tissue_model(const Eigen::MatrixXd& depths_mm,
     for (Index n = 0; n < depths_mm.cols(); ++n) {
       const double depth = depths_mm(used[static_cast<std::size_t>(i)], n);
       used_depths(i, n) =
-          std::isnan(depth) ? not_a_number : std::log(std::max(depth, options.floor_mm));
+          std::isnan(depth) ? not_a_number : std::log(std::max(depth, kThinnestTissue_mm));
     }
   }
   const Eigen::VectorXi used_counts = model.count(used);
@@ -382,13 +381,13 @@ Result<TissueModel> build_tissue_model(const Eigen::MatrixXd& depths_mm,
   return model;
 }
 
-Belief tissue_belief(const TissueModel& model, const Eigen::VectorXd& depths_mm, double floor_mm) {
+Belief tissue_belief(const TissueModel& model, const Eigen::VectorXd& depths_mm) {
   Eigen::MatrixXd information = Eigen::MatrixXd::Identity(model.mode_count(), model.mode_count());
   Eigen::VectorXd pull = Eigen::VectorXd::Zero(model.mode_count());
   for (Index v = 0; v < model.vertex_count(); ++v) {
     if (!model.modelled[static_cast<std::size_t>(v)] || std::isnan(depths_mm[v])) continue;
     const double precision = 1.0 / (model.noise_sd[v] * model.noise_sd[v]);
-    const double error = std::log(std::max(depths_mm[v], floor_mm)) - model.log_mean[v];
+    const double error = std::log(std::max(depths_mm[v], kThinnestTissue_mm)) - model.log_mean[v];
     information.noalias() += precision * model.modes.row(v).transpose() * model.modes.row(v);
     pull.noalias() += precision * error * model.modes.row(v).transpose();
   }

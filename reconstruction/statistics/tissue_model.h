@@ -29,12 +29,14 @@ struct TissueModel {
   Result<void> validate() const;
 };
 
+/// Thinner skin than this is not believed.
+inline constexpr double kThinnestTissue_mm = 1.0;
+
 struct TissueModelOptions {
   int modes = 6;
   int least_count = 5;              ///< subjects; vertices with fewer are not modelled
   double shrinkage_count = 3.0;     ///< subjects that each neighbour's mean is worth
   double degrees_of_freedom = 4.0;  ///< Student's t: how far outlying depths are doubted
-  double floor_mm = 1.0;            ///< thinner skin than this is not believed
   int iterations = 60;
 
   Result<void> validate() const;
@@ -51,8 +53,7 @@ Result<TissueModel> build_tissue_model(const Eigen::MatrixXd& depths_mm,
                                        const TissueModelOptions& options = {});
 
 /// The coefficients of a subject whose depths (#V, NaN: not measured) were measured.
-Belief tissue_belief(const TissueModel& model, const Eigen::VectorXd& depths_mm,
-                     double floor_mm = 1.0);
+Belief tissue_belief(const TissueModel& model, const Eigen::VectorXd& depths_mm);
 
 /// Depths (#V [mm], NaN where not modelled) for coefficients z, and the mean that the model expects
 /// for the belief (back from the logarithm: exp(mean + variance / 2)).

@@ -21,6 +21,13 @@ TEST(TriangleMesh, AreaOfATetrahedron) {
   EXPECT_NEAR(surface_area(tetrahedron()), 3 * 2.0 + std::sqrt(3.0) / 4.0 * 8.0, 1e-12);
 }
 
+TEST(TriangleMesh, VerticesShareTheirTrianglesAreas) {
+  const Eigen::VectorXd areas = vertex_areas(tetrahedron());
+  // The corner has a third of each of the three small sides.
+  EXPECT_NEAR(areas[0], 2.0, 1e-12);
+  EXPECT_NEAR(areas.sum(), surface_area(tetrahedron()), 1e-12);
+}
+
 TEST(TriangleMesh, NormalsPointOutwards) {
   const Points3 normals = vertex_normals(tetrahedron());
   const Eigen::RowVector3d corner = Eigen::RowVector3d(-1, -1, -1).normalized();

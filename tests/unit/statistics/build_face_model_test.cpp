@@ -73,24 +73,35 @@ TEST(BuildFaceModel, LearnsHowTheHeadFollowsFromTheSkull) {
 
 TEST(LeaveOneOut, TheSkullTellsMuchAndTheBodyMassIndexTheRest) {
   const auto aligned = aligned_population(skull_template(), head_template(), people(40)).value();
-  const auto left = leave_one_out(skull_template(), head_template(), aligned, {}).value();
+  const auto tissue = population_tissue_model(skull_template(), aligned).value();
+  const auto left = leave_one_out(skull_template(), head_template(), aligned, tissue).value();
   ASSERT_EQ(left.size(), 40U);
   double mean = 0.0;
   double skull = 0.0;
   double full = 0.0;
+  double mean_tissue = 0.0;
+  double skull_tissue = 0.0;
+  double full_tissue = 0.0;
   int inside = 0;
   int all = 0;
   for (const LeftOut& subject : left) {
-    mean += subject.mean_error_mm.cwiseAbs().mean() / 40.0;
-    skull += subject.skull_error_mm.cwiseAbs().mean() / 40.0;
-    full += subject.full_error_mm.cwiseAbs().mean() / 40.0;
-    for (Index v = 0; v < subject.skull_error_mm.size(); ++v) {
-      inside += std::abs(subject.full_error_mm[v]) < 1.2816 * subject.full_sd_mm[v] ? 1 : 0;
+    mean += subject.mean.head_mm.cwiseAbs().mean() / 40.0;
+    skull += subject.given_skull.head_mm.cwiseAbs().mean() / 40.0;
+    full += subject.given_all.head_mm.cwiseAbs().mean() / 40.0;
+    mean_tissue += subject.mean.tissue_mm / 40.0;
+    skull_tissue += subject.given_skull.tissue_mm / 40.0;
+    full_tissue += subject.given_all.tissue_mm / 40.0;
+    for (Index v = 0; v < subject.given_skull.head_mm.size(); ++v) {
+      inside +=
+          std::abs(subject.given_all.head_mm[v]) < 1.2816 * subject.given_all.head_sd_mm[v] ? 1 : 0;
       ++all;
     }
   }
   EXPECT_LT(skull, 0.85 * mean);
   EXPECT_LT(full, 0.6 * skull);
+  // These skulls tell nothing of the tissue upon them, and nothing is read into them.
+  EXPECT_LT(skull_tissue, 1.06 * mean_tissue);
+  EXPECT_LT(full_tissue, 0.3 * mean_tissue);
   // An 80 % band of a Gaussian holds about 80 %.
   EXPECT_GT(inside, 0.6 * all);
 }

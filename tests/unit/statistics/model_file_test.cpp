@@ -43,6 +43,8 @@ TEST(ModelFile, GivesTheModelBack) {
   EXPECT_EQ(back->tissue.modelled, model.tissue.modelled);
   EXPECT_EQ(back->joint.names, model.joint.names);
   EXPECT_EQ(back->joint.covariance, model.joint.covariance);
+  EXPECT_EQ(back->joint.blocks, model.joint.blocks);
+  EXPECT_EQ(back->joint.penalties, model.joint.penalties);
   EXPECT_EQ(back->joint.subjects, 8);
   ASSERT_EQ(back->skin_directions.size(), 1U);
   EXPECT_EQ(back->skin_directions[0].direction, model.skin_directions[0].direction);

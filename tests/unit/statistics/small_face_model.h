@@ -73,8 +73,8 @@ inline FaceModel small_face_model() {
     values(0, n) = coefficients_of(model.skull, skulls[static_cast<std::size_t>(n)])[0];
     values(1, n) = coefficients_of(model.head, heads[static_cast<std::size_t>(n)])[0];
   }
-  const int outputs[] = {1};
-  model.joint = build_joint_model({"skull 1", "head 1"}, values, outputs).value();
+  const VariableBlock blocks[] = {{"skull", {"skull 1"}, {}, {}}, {"head", {"head 1"}, {}, {}}};
+  model.joint = build_joint_model(blocks, values).value();
   model.skin_directions = {{"nasion", Eigen::Vector3d(0.0, -0.6, 0.8), 6.0, 1.5}};
   model.bands = {{"nose", 0.8, 1.4, 240}};
   model.provenance = R"({"subjects": 8, "made of": "balls"})";
