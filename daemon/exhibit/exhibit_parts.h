@@ -33,6 +33,7 @@ struct ExhibitPicture {
 // NOLINTNEXTLINE(bugprone-exception-escape): moving a JSON value throws nothing in fact
 struct Exhibit {
   ExhibitLabel label;
+  std::string address;  ///< of the folder, without a slash at its end; empty: not known
   std::string title;
   std::string case_number;
   std::string station;
@@ -42,6 +43,9 @@ struct Exhibit {
   std::vector<ExhibitModel> models;
   std::vector<ExhibitPicture> pictures;
 };
+
+/// A file's name as a part of an address: all but RFC 3986's unreserved characters as %XX.
+std::string in_address(const std::string& name);
 
 /// Smithsonian Voyager's document (.svx.json, schemas.3d.si.edu/voyager).
 nlohmann::ordered_json voyager_scene(const Exhibit& exhibit);
