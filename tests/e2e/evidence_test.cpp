@@ -13,22 +13,17 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/evidence/small_case.h"
 
-namespace skullstation {
+namespace skullstation::testing {
 namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
-using skullstation::testing::Process;
-using skullstation::testing::ProcessResult;
-using skullstation::testing::skullstation_cli;
-using skullstation::testing::skullstation_program;
-using skullstation::testing::TemporaryFolder;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
 class Evidence : public ::testing::Test {
  protected:
-  Evidence() { fs::copy(testing::test_keys_folder(), folder_ / "keys"); }
+  Evidence() { fs::copy(test_keys_folder(), folder_ / "keys"); }
 
   std::vector<std::string> package_words(const std::string& out) {
     return {"package",     folder_ / "case",
@@ -51,7 +46,7 @@ class Evidence : public ::testing::Test {
 };
 
 TEST_F(Evidence, IsSealedVerifiedDamagedAndNamed) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   auto words = package_words("bag");
   words.emplace_back("--json");
   const auto sealed = skullstation_cli(words);
@@ -62,7 +57,7 @@ TEST_F(Evidence, IsSealedVerifiedDamagedAndNamed) {
   EXPECT_EQ(intact.exit_code, 0) << intact.out;
   EXPECT_EQ(nlohmann::json::parse(intact.out)["trusted"], true);
 
-  testing::change_byte(folder_ / "bag/data/case/head.ply", 300'000, 1);
+  change_byte(folder_ / "bag/data/case/head.ply", 300'000, 1);
   const auto damaged = skullstation_cli({"verify", folder_ / "bag"});
   EXPECT_EQ(damaged.exit_code, 3);
   EXPECT_THAT(damaged.out, HasSubstr("data/case/head.ply: is not as it was sealed; within bytes "
@@ -75,7 +70,7 @@ TEST_F(Evidence, IsSealedVerifiedDamagedAndNamed) {
 }
 
 TEST_F(Evidence, TheAuditLogIsShownAndVerifiedAgainstPackages) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   ASSERT_EQ(skullstation_cli(package_words("bag1")).exit_code, 0);
   ASSERT_EQ(skullstation_cli(package_words("bag2")).exit_code, 0);
   const auto shown = skullstation_cli({"audit", "show", folder_ / "audit.jsonl", "--last", "1"});
@@ -100,7 +95,7 @@ TEST_F(Evidence, TheAuditLogIsShownAndVerifiedAgainstPackages) {
 }
 
 TEST_F(Evidence, NamesInAPackageCantSteerTheTerminal) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   ASSERT_EQ(skullstation_cli(package_words("bag")).exit_code, 0);
   ASSERT_TRUE(write_file_durably(folder_ / "bag/data/\x1b[2J\xff", "x"));
   const auto checked = skullstation_cli({"verify", folder_ / "bag"});
@@ -112,7 +107,7 @@ TEST_F(Evidence, NamesInAPackageCantSteerTheTerminal) {
 }
 
 TEST_F(Evidence, KeysAndLogCanStandInTheConfiguration) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   const auto made =
       skullstation_cli({"keys", "create", folder_ / "new_keys", "--station", "ST-07", "--json"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
@@ -130,7 +125,7 @@ TEST_F(Evidence, KeysAndLogCanStandInTheConfiguration) {
 }
 
 TEST_F(Evidence, MistakesAreNamed) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   auto words = package_words("bag");
   fs::permissions(folder_ / "keys/ed25519.key", fs::perms::others_read, fs::perm_options::add);
   const auto open_key = skullstation_cli(words);
@@ -142,16 +137,16 @@ TEST_F(Evidence, MistakesAreNamed) {
   EXPECT_THAT(no_keys.err, HasSubstr("skullstation keys create"));
   EXPECT_EQ(skullstation_cli({"verify", folder_ / "case"}).exit_code, 3);
   EXPECT_EQ(skullstation_cli({"audit", "verify", folder_ / "none"}).exit_code, 3);
-  const auto no_key = skullstation_cli({"audit", "verify", folder_ / "none", "--trust",
-                                        testing::test_keys_folder() / "certificate.pem"});
+  const auto no_key = skullstation_cli(
+      {"audit", "verify", folder_ / "none", "--trust", test_keys_folder() / "certificate.pem"});
   EXPECT_EQ(no_key.exit_code, 3);
   EXPECT_THAT(no_key.err, HasSubstr("holds no public key"));
   EXPECT_EQ(skullstation_cli({"keys", "create", folder_ / "case", "--station", "X"}).exit_code, 2);
 }
 
 TEST_F(Evidence, SurvivesBeingKilledAtRandomMomentsOfPackaging) {
-  const int kills_wanted = testing::long_form() ? 100 : 10;
-  testing::write_small_case(folder_.path(), 24'000'000);
+  const int kills_wanted = long_form() ? 100 : 10;
+  write_small_case(folder_.path(), 24'000'000);
   std::vector<std::string> command = package_words("bag");
   command.insert(command.begin(), skullstation_program().string());
   Random random(20260131);
@@ -190,4 +185,4 @@ TEST_F(Evidence, SurvivesBeingKilledAtRandomMomentsOfPackaging) {
 }
 
 }  // namespace
-}  // namespace skullstation
+}  // namespace skullstation::testing
