@@ -9,6 +9,7 @@
 #include "core/session/image_file.h"
 #include "core/session/strict_json.h"
 #include "core/staged_folder.h"
+#include "core/url_path.h"
 #include "daemon/evidence/package.h"
 #include "daemon/evidence/package_check.h"
 #include "daemon/exhibit/exhibit_parts.h"
@@ -171,7 +172,7 @@ Result<void> add_pictures(const fs::path& case_folder, const StagedFolder& stage
 std::string address_of(const std::string& base, const fs::path& out) {
   const fs::path whole = fs::absolute(out).lexically_normal();
   const fs::path name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-  return fmt::format("{}{}{}", base, base.ends_with('/') ? "" : "/", in_address(name.string()));
+  return fmt::format("{}{}{}", base, base.ends_with('/') ? "" : "/", url_path(name.string()));
 }
 
 std::string text_of(const nlohmann::ordered_json& document) {

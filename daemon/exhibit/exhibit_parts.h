@@ -44,9 +44,6 @@ struct Exhibit {
   std::vector<ExhibitPicture> pictures;
 };
 
-/// A file's name as a part of an address: all but RFC 3986's unreserved characters as %XX.
-std::string in_address(const std::string& name);
-
 /// Smithsonian Voyager's document (.svx.json, schemas.3d.si.edu/voyager).
 nlohmann::ordered_json voyager_scene(const Exhibit& exhibit);
 

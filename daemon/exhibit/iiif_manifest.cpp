@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/url_path.h"
 #include "daemon/exhibit/exhibit_parts.h"
 
 namespace skullstation {
@@ -29,7 +30,7 @@ std::string registered_licence(const std::string& url) {
 }
 
 Json canvas(const std::string& base, const ExhibitPicture& picture) {
-  const std::string file = in_address(picture.file);
+  const std::string file = url_path(picture.file);
   const std::string id = fmt::format("{}/canvas/{}", base, file);
   const Json image = {{"id", fmt::format("{}/{}", base, file)},
                       {"type", "Image"},
@@ -52,16 +53,6 @@ Json canvas(const std::string& base, const ExhibitPicture& picture) {
 }
 
 }  // namespace
-
-std::string in_address(const std::string& name) {
-  std::string text;
-  for (const char c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       std::string_view("-._~").find(c) != std::string_view::npos;
-    text += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
-  }
-  return text;
-}
 
 Json iiif_manifest(const Exhibit& exhibit) {
   const ExhibitLabel& label = exhibit.label;
