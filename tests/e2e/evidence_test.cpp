@@ -9,6 +9,7 @@
 
 #include "core/file.h"
 #include "core/random.h"
+#include "reconstruction/io/glb.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/evidence/small_case.h"
@@ -122,6 +123,35 @@ TEST_F(Evidence, KeysAndLogCanStandInTheConfiguration) {
   EXPECT_THAT(skullstation_cli({"verify", folder_ / "bag"}).out, HasSubstr(fingerprint));
   EXPECT_THAT(skullstation_cli({"keys", "show", folder_ / "new_keys"}).out, HasSubstr(fingerprint));
   EXPECT_THAT(read_file(folder_ / "log.jsonl").value(), HasSubstr("\"station\":\"ST-07\""));
+}
+
+TEST_F(Evidence, ASealedCaseIsExhibited) {
+  write_small_case(folder_.path());
+  TriangleMesh head;
+  head.vertices = Points3::Identity(3, 3);
+  head.triangles.resize(1, 3);
+  head.triangles << 0, 1, 2;
+  ASSERT_TRUE(write_glb(head, folder_ / "case/head.glb"));
+  ASSERT_EQ(skullstation_cli(package_words("bag")).exit_code, 0);
+  ASSERT_TRUE(write_file_durably(folder_ / "station.toml",
+                                 "[museum]\nrights_url = "
+                                 "\"https://creativecommons.org/publicdomain/zero/1.0/\"\n"
+                                 "base_url = \"https://museum.example/cases/\"\n"));
+  const auto shown = skullstation_cli({"exhibit", folder_ / "bag", "--out", folder_ / "web/case 7/",
+                                       "--config", folder_ / "station.toml", "--json"});
+  ASSERT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_EQ(nlohmann::json::parse(shown.out)["files"],
+            nlohmann::json({"head.glb", "scene.svx.json", "manifest.json"}));
+  const auto manifest =
+      nlohmann::json::parse(read_file(folder_ / "web/case 7/manifest.json").value());
+  EXPECT_EQ(manifest["id"], "https://museum.example/cases/case%207/manifest.json");
+  EXPECT_EQ(manifest["rights"], "http://creativecommons.org/publicdomain/zero/1.0/");
+
+  change_byte(folder_ / "bag/data/case/head.glb", 100, 1);
+  const auto damaged = skullstation_cli({"exhibit", folder_ / "bag", "--out", folder_ / "new"});
+  EXPECT_EQ(damaged.exit_code, 3);
+  EXPECT_THAT(damaged.err, HasSubstr("is not as it was sealed (data/case/head.glb"));
+  EXPECT_FALSE(fs::exists(folder_ / "new"));
 }
 
 TEST_F(Evidence, MistakesAreNamed) {
