@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mount.h>
 
 #include "core/file.h"
 #include "tests/servers/servers.h"
@@ -83,6 +84,17 @@ TEST_F(Dicom, WhoIsNotKnownIsRefused) {
 TEST_F(Dicom, CutConnectionsLoseAndDoubleNothing) {
   const auto server = start_orthanc(folder_.path(), true);
   survives_cuts(dicom(18502), 18502, 14242, 2'000'000);
+}
+
+TEST_F(Dicom, AFullDiskWaits) {
+  if (::mount("none", make("db").c_str(), "tmpfs", 0, "size=1m") != 0) {
+    GTEST_SKIP() << "nothing can be mounted here";
+  }
+  {
+    const auto server = start_orthanc(folder_.path(), true);
+    EXPECT_THAT(fails(dicom(), ErrorKind::hardware), HasSubstr("has no room"));
+  }
+  ::umount2((folder_ / "db").c_str(), MNT_DETACH);
 }
 
 }  // namespace

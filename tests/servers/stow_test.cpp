@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mount.h>
 
 #include "tests/servers/servers.h"
 
@@ -56,6 +57,20 @@ TEST_F(Stow, CutConnectionsLoseAndDoubleNothing) {
   TargetConfig config = stow();
   config.address = "https://localhost:18505/dicom-web";
   survives_cuts(config, 18505, 18443, 2'000'000);
+}
+
+TEST_F(Stow, AFullDiskWaits) {
+  make("dav");
+  if (::mount("none", make("db").c_str(), "tmpfs", 0, "size=1m") != 0) {
+    GTEST_SKIP() << "nothing can be mounted here";
+  }
+  {
+    const auto orthanc = start_orthanc(folder_.path(), false);
+    const auto server = start_nginx(folder_.path(), folder_ / "dav");
+    EXPECT_THAT(fails(stow(), ErrorKind::hardware), HasSubstr("does not hold it"))
+        << "what Orthanc answers is no error";
+  }
+  ::umount2((folder_ / "db").c_str(), MNT_DETACH);
 }
 
 }  // namespace
