@@ -8,26 +8,13 @@
 
 namespace skullstation {
 
-namespace {
-
-/// The folder's own name goes below the configured address.
-std::string address_of(const std::string& base, const std::filesystem::path& out) {
-  if (base.empty()) return {};
-  const auto whole = std::filesystem::absolute(out).lexically_normal();
-  const auto name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-  return fmt::format("{}{}{}", base, base.ends_with('/') ? "" : "/", name.string());
-}
-
-}  // namespace
-
 Result<CommandReport> run(const ExhibitCommand& command, const CommonOptions&,
                           const Progress& progress) {
   const auto config = read_config(command.config);
   if (!config) return forward(config);
   const MuseumConfig& museum = config->museum;
   const auto files = write_exhibit(
-      command.package,
-      {museum.holder, museum.rights, museum.rights_url, address_of(museum.base_url, command.out)},
+      command.package, {museum.holder, museum.rights, museum.rights_url, museum.base_url},
       SKULLSTATION_VERSION, command.out, progress);
   if (!files) return forward(files);
   CommandReport report;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <fstream>
 
 #include "core/sha256.h"
@@ -339,16 +338,6 @@ tl::unexpected<Error> status_error(const std::string& url, const CurlAnswer& ans
   if (answer.status >= 500) return told(ErrorKind::hardware, "the receiver has trouble of its own");
   return told(ErrorKind::bad_input, "the receiver refuses it",
               "its administrator can see the reason in its log; then retry");
-}
-
-std::string url_path(const std::string& path) {
-  std::string url;
-  for (const unsigned char c : path) {
-    const bool plain =
-        std::isalnum(c) != 0 || c == '-' || c == '.' || c == '_' || c == '~' || c == '/';
-    url += plain ? std::string(1, static_cast<char>(c)) : fmt::format("%{:02X}", c);
-  }
-  return url;
 }
 
 std::string without_slash(std::string address) {

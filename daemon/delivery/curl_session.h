@@ -61,9 +61,6 @@ class CurlSession {
 /// What an HTTP status that was not hoped for means for the delivery.
 tl::unexpected<Error> status_error(const std::string& url, const CurlAnswer& answer);
 
-/// The path with everything but letters, digits, "-._~" and '/' as %XX.
-std::string url_path(const std::string& path);
-
 /// The address without an ending '/'.
 std::string without_slash(std::string address);
 

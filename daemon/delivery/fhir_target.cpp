@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/url_path.h"
 #include "daemon/delivery/curl_session.h"
 #include "daemon/delivery/fhir_bundle.h"
 #include "daemon/delivery/target.h"

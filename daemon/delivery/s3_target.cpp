@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/file.h"
+#include "core/url_path.h"
 #include "daemon/delivery/curl_session.h"
 #include "daemon/delivery/target.h"
 

@@ -5,6 +5,7 @@
 
 #include <set>
 
+#include "core/url_path.h"
 #include "daemon/delivery/curl_session.h"
 #include "daemon/delivery/target.h"
 

@@ -7,7 +7,9 @@
 
 #include "core/file.h"
 #include "core/session/image_file.h"
+#include "core/session/strict_json.h"
 #include "core/staged_folder.h"
+#include "core/url_path.h"
 #include "daemon/evidence/package.h"
 #include "daemon/evidence/package_check.h"
 #include "daemon/exhibit/exhibit_parts.h"
@@ -28,6 +30,23 @@ Result<PackageCheck> checked(const fs::path& package, const Progress& progress) 
   return fail(ErrorKind::bad_input, package.string(),
               fmt::format("is not as it was sealed ({}: {})", first.file, first.what),
               "`skullstation verify` tells more; take a sound copy of it");
+}
+
+/// The sealed case.json. Its seals say who sealed it, not that it is what `approximate` writes.
+Result<json> read_record(const fs::path& file) {
+  const auto text = read_file(file);
+  if (!text) return forward(text);
+  auto record = parse_strict_json(*text, file.string());
+  if (!record) return record;
+  const auto no_case = [&](const char* what) {
+    return fail(ErrorKind::bad_input, file.string(), what,
+                "exhibit a package of a case that `skullstation approximate` made");
+  };
+  if (!record->is_object()) return no_case("is no JSON object");
+  if (record->contains("model") && !(*record)["model"].is_object()) {
+    return no_case("has a \"model\" that is no JSON object");
+  }
+  return record;
 }
 
 std::vector<std::string> texts_at(const json& record, const char* key) {
@@ -111,7 +130,11 @@ Result<void> add_model(const fs::path& file, ExhibitModel model, const StagedFol
   if (!container) return forward(container);
   const auto extent = glb_extent(container->gltf, file.string());
   if (!extent) return forward(extent);
-  describe(container->gltf, exhibit, model.title);
+  try {
+    describe(container->gltf, exhibit, model.title);
+  } catch (const json::exception& error) {  // its "asset" is a list, say
+    return no_glb(file.string(), error.what());
+  }
   const std::string described = join_glb(*container);
   model.bytes = described.size();
   model.extent = *extent;
@@ -145,6 +168,13 @@ Result<void> add_pictures(const fs::path& case_folder, const StagedFolder& stage
   return {};
 }
 
+/// The folder's own name below the configured address.
+std::string address_of(const std::string& base, const fs::path& out) {
+  const fs::path whole = fs::absolute(out).lexically_normal();
+  const fs::path name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
+  return fmt::format("{}{}{}", base, base.ends_with('/') ? "" : "/", url_path(name.string()));
+}
+
 std::string text_of(const nlohmann::ordered_json& document) {
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
@@ -158,14 +188,15 @@ Result<std::vector<std::string>> write_exhibit(const fs::path& package, const Ex
   const auto check = checked(package, progress.part(0.0, 0.7));
   if (!check) return forward(check);
   const fs::path case_folder = package / "data/case";
-  const auto text = read_file(case_folder / "case.json");
-  if (!text) return forward(text);
-  const json record = json::parse(*text, nullptr, false);  // sealed, so it was read before
+  const auto read = read_record(case_folder / "case.json");
+  if (!read) return forward(read);
+  const json& record = *read;
   const auto sum = sha256_of_file(package / tag_manifest_file);
   if (!sum) return forward(sum);
 
   Exhibit exhibit;
   exhibit.label = label;
+  if (!label.base_url.empty()) exhibit.address = address_of(label.base_url, out);
   exhibit.case_number = check->case_number;
   exhibit.title = fmt::format("Case {}: skull and facial approximation", check->case_number);
   exhibit.station = check->station;

@@ -14,7 +14,7 @@ struct ExhibitLabel {
   std::string holder;      ///< the institution
   std::string rights;      ///< a sentence: "© Museum of Bones, CC BY-NC 4.0"
   std::string rights_url;  ///< of the licence: creativecommons.org or rightsstatements.org
-  std::string base_url;    ///< where the folder will be served; empty: no IIIF manifest
+  std::string base_url;    ///< below which the folder will be served; empty: no IIIF manifest
 };
 
 /// Writes a folder that can be put on a web server, made of a sealed package's skull and head:
@@ -24,7 +24,8 @@ struct ExhibitLabel {
 ///   preview_*.png            the case's pictures
 ///   manifest.json            IIIF Presentation 3: the pictures, the models beside them
 /// Returns the files' names. The folder appears whole or not at all. Errors: bad_input (no
-/// package, not as it was sealed, without a head), usage (`out` is there).
+/// package, not as it was sealed, of something else than a case with a head), usage (`out` is
+/// there).
 Result<std::vector<std::string>> write_exhibit(const std::filesystem::path& package,
                                                const ExhibitLabel& label,
                                                const std::string& program_version,

@@ -33,6 +33,7 @@ struct ExhibitPicture {
 // NOLINTNEXTLINE(bugprone-exception-escape): moving a JSON value throws nothing in fact
 struct Exhibit {
   ExhibitLabel label;
+  std::string address;  ///< of the folder, without a slash at its end; empty: not known
   std::string title;
   std::string case_number;
   std::string station;

@@ -16,11 +16,11 @@ std::uint32_t number_at(std::string_view bytes, std::size_t at) {
   return load_number<std::uint32_t>(bytes.data() + at, std::endian::little);
 }
 
-tl::unexpected<Error> no_glb(const std::string& where, const char* why) {
-  return fail(ErrorKind::bad_input, where, std::string("is no binary glTF 2.0 file: ") + why);
-}
-
 }  // namespace
+
+tl::unexpected<Error> no_glb(const std::string& where, const std::string& why) {
+  return fail(ErrorKind::bad_input, where, "is no binary glTF 2.0 file: " + why);
+}
 
 Result<GlbContainer> split_glb(std::string_view bytes, const std::string& where) {
   if (bytes.size() < header_bytes + chunk_header_bytes || bytes.substr(0, 4) != "glTF" ||

@@ -15,6 +15,9 @@ struct GlbContainer {
   std::string chunks;
 };
 
+/// The error of a file that is none; `where` names it.
+tl::unexpected<Error> no_glb(const std::string& where, const std::string& why);
+
 /// Errors (bad_input): not a GLB file, or cut off; `where` names it.
 Result<GlbContainer> split_glb(std::string_view bytes, const std::string& where);
 std::string join_glb(const GlbContainer& container);

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
+#include <algorithm>
+
+#include "core/url_path.h"
 #include "daemon/exhibit/exhibit_parts.h"
 
 namespace skullstation {
@@ -15,9 +17,22 @@ Json entry(const std::string& label, const std::string& value) {
   return {{"label", in_english(label)}, {"value", in_english(value)}};
 }
 
+/// The licence as its registry spells it; empty for one of another registry, which `rights` may not
+/// hold (Presentation 3.0, 3.2). The registries' addresses are http, whatever they are served by.
+std::string registered_licence(const std::string& url) {
+  const std::string address = url.substr(std::min(url.find("://"), url.size()));
+  for (const char* registry :
+       {"://creativecommons.org/licenses/", "://creativecommons.org/publicdomain/",
+        "://rightsstatements.org/vocab/"}) {
+    if (address.starts_with(registry)) return "http" + address;
+  }
+  return {};
+}
+
 Json canvas(const std::string& base, const ExhibitPicture& picture) {
-  const std::string id = fmt::format("{}/canvas/{}", base, picture.file);
-  const Json image = {{"id", fmt::format("{}/{}", base, picture.file)},
+  const std::string file = url_path(picture.file);
+  const std::string id = fmt::format("{}/canvas/{}", base, file);
+  const Json image = {{"id", fmt::format("{}/{}", base, file)},
                       {"type", "Image"},
                       {"format", "image/png"},
                       {"width", picture.width},
@@ -41,7 +56,7 @@ Json canvas(const std::string& base, const ExhibitPicture& picture) {
 
 Json iiif_manifest(const Exhibit& exhibit) {
   const ExhibitLabel& label = exhibit.label;
-  const std::string base = label.base_url.substr(0, label.base_url.find_last_not_of('/') + 1);
+  const std::string& base = exhibit.address;
   Json manifest = {{"@context", "http://iiif.io/api/presentation/3/context.json"},
                    {"id", base + "/manifest.json"},
                    {"type", "Manifest"},
@@ -51,7 +66,11 @@ Json iiif_manifest(const Exhibit& exhibit) {
                    entry("Made with", exhibit.made_by),
                    entry("Sealed package (SHA-256)", exhibit.package_sha256)});
   if (!label.holder.empty()) manifest["metadata"].push_back(entry("Institution", label.holder));
-  if (!label.rights_url.empty()) manifest["rights"] = label.rights_url;
+  const std::string licence = registered_licence(label.rights_url);
+  if (!licence.empty()) manifest["rights"] = licence;
+  if (licence.empty() && !label.rights_url.empty()) {
+    manifest["metadata"].push_back(entry("Licence", label.rights_url));
+  }
   std::vector<std::string> notes = exhibit.warnings;
   if (!label.rights.empty()) notes.insert(notes.begin(), label.rights);
   if (!notes.empty()) {

@@ -16,29 +16,24 @@
 #include "tests/unit/delivery/sealed_case.h"
 #include "tests/unit/evidence/small_case.h"
 
-namespace skullstation {
+namespace skullstation::testing {
 namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using nlohmann::json;
-using skullstation::testing::Process;
-using skullstation::testing::ProcessResult;
-using skullstation::testing::skullstation_cli;
-using skullstation::testing::skullstation_program;
-using skullstation::testing::TemporaryFolder;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
 class Deliver : public ::testing::Test {
  protected:
   void seal(std::size_t large_bytes) {
-    package_ = testing::seal_small_case(folder_.path(), large_bytes);
+    package_ = seal_small_case(folder_.path(), large_bytes);
     fs::create_directories(folder_ / "share");
     configure("");
   }
   void configure(const std::string& more) {
-    fs::copy(testing::test_keys_folder(), folder_ / "keys",
+    fs::copy(test_keys_folder(), folder_ / "keys",
              fs::copy_options::skip_existing | fs::copy_options::recursive);
     ASSERT_TRUE(write_file_durably(
         folder_ / "station.toml",
@@ -98,7 +93,7 @@ TEST_F(Deliver, MistakesAreNamed) {
   EXPECT_THAT(deliver({"test", "shaer"}).err, HasSubstr("did you mean share?"));
   EXPECT_EQ(deliver({"retry", "7"}).exit_code, 2);
   EXPECT_EQ(deliver({"send", folder_ / "case"}).exit_code, 3);
-  testing::change_byte(package_.folder / "data/case/head.ply", 200, 1);
+  change_byte(package_.folder / "data/case/head.ply", 200, 1);
   const auto damaged = deliver({"send", package_.folder});
   EXPECT_EQ(damaged.exit_code, 3);
   EXPECT_THAT(damaged.err, HasSubstr("nothing was sent"));
@@ -159,7 +154,7 @@ TEST_F(Deliver, NoSecretIsInOutboxLogsProcessListOrCoreDump) {
 }
 
 TEST_F(Deliver, SurvivesBeingKilledAtRandomMomentsOfSending) {
-  const int kills_wanted = testing::long_form() ? 100 : 10;
+  const int kills_wanted = long_form() ? 100 : 10;
   seal(24'000'000);
   std::vector<std::string> command = words({"send", package_.folder});
   command.insert(command.begin(), skullstation_program().string());
@@ -202,4 +197,4 @@ TEST_F(Deliver, SurvivesBeingKilledAtRandomMomentsOfSending) {
 }
 
 }  // namespace
-}  // namespace skullstation
+}  // namespace skullstation::testing

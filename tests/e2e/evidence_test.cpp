@@ -9,26 +9,22 @@
 
 #include "core/file.h"
 #include "core/random.h"
+#include "reconstruction/io/glb.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/evidence/small_case.h"
 
-namespace skullstation {
+namespace skullstation::testing {
 namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
-using skullstation::testing::Process;
-using skullstation::testing::ProcessResult;
-using skullstation::testing::skullstation_cli;
-using skullstation::testing::skullstation_program;
-using skullstation::testing::TemporaryFolder;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
 class Evidence : public ::testing::Test {
  protected:
-  Evidence() { fs::copy(testing::test_keys_folder(), folder_ / "keys"); }
+  Evidence() { fs::copy(test_keys_folder(), folder_ / "keys"); }
 
   std::vector<std::string> package_words(const std::string& out) {
     return {"package",     folder_ / "case",
@@ -51,7 +47,7 @@ class Evidence : public ::testing::Test {
 };
 
 TEST_F(Evidence, IsSealedVerifiedDamagedAndNamed) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   auto words = package_words("bag");
   words.emplace_back("--json");
   const auto sealed = skullstation_cli(words);
@@ -62,7 +58,7 @@ TEST_F(Evidence, IsSealedVerifiedDamagedAndNamed) {
   EXPECT_EQ(intact.exit_code, 0) << intact.out;
   EXPECT_EQ(nlohmann::json::parse(intact.out)["trusted"], true);
 
-  testing::change_byte(folder_ / "bag/data/case/head.ply", 300'000, 1);
+  change_byte(folder_ / "bag/data/case/head.ply", 300'000, 1);
   const auto damaged = skullstation_cli({"verify", folder_ / "bag"});
   EXPECT_EQ(damaged.exit_code, 3);
   EXPECT_THAT(damaged.out, HasSubstr("data/case/head.ply: is not as it was sealed; within bytes "
@@ -75,7 +71,7 @@ TEST_F(Evidence, IsSealedVerifiedDamagedAndNamed) {
 }
 
 TEST_F(Evidence, TheAuditLogIsShownAndVerifiedAgainstPackages) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   ASSERT_EQ(skullstation_cli(package_words("bag1")).exit_code, 0);
   ASSERT_EQ(skullstation_cli(package_words("bag2")).exit_code, 0);
   const auto shown = skullstation_cli({"audit", "show", folder_ / "audit.jsonl", "--last", "1"});
@@ -100,7 +96,7 @@ TEST_F(Evidence, TheAuditLogIsShownAndVerifiedAgainstPackages) {
 }
 
 TEST_F(Evidence, NamesInAPackageCantSteerTheTerminal) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   ASSERT_EQ(skullstation_cli(package_words("bag")).exit_code, 0);
   ASSERT_TRUE(write_file_durably(folder_ / "bag/data/\x1b[2J\xff", "x"));
   const auto checked = skullstation_cli({"verify", folder_ / "bag"});
@@ -112,7 +108,7 @@ TEST_F(Evidence, NamesInAPackageCantSteerTheTerminal) {
 }
 
 TEST_F(Evidence, KeysAndLogCanStandInTheConfiguration) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   const auto made =
       skullstation_cli({"keys", "create", folder_ / "new_keys", "--station", "ST-07", "--json"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
@@ -129,8 +125,37 @@ TEST_F(Evidence, KeysAndLogCanStandInTheConfiguration) {
   EXPECT_THAT(read_file(folder_ / "log.jsonl").value(), HasSubstr("\"station\":\"ST-07\""));
 }
 
+TEST_F(Evidence, ASealedCaseIsExhibited) {
+  write_small_case(folder_.path());
+  TriangleMesh head;
+  head.vertices = Points3::Identity(3, 3);
+  head.triangles.resize(1, 3);
+  head.triangles << 0, 1, 2;
+  ASSERT_TRUE(write_glb(head, folder_ / "case/head.glb"));
+  ASSERT_EQ(skullstation_cli(package_words("bag")).exit_code, 0);
+  ASSERT_TRUE(write_file_durably(folder_ / "station.toml",
+                                 "[museum]\nrights_url = "
+                                 "\"https://creativecommons.org/publicdomain/zero/1.0/\"\n"
+                                 "base_url = \"https://museum.example/cases/\"\n"));
+  const auto shown = skullstation_cli({"exhibit", folder_ / "bag", "--out", folder_ / "web/case 7/",
+                                       "--config", folder_ / "station.toml", "--json"});
+  ASSERT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_EQ(nlohmann::json::parse(shown.out)["files"],
+            nlohmann::json({"head.glb", "scene.svx.json", "manifest.json"}));
+  const auto manifest =
+      nlohmann::json::parse(read_file(folder_ / "web/case 7/manifest.json").value());
+  EXPECT_EQ(manifest["id"], "https://museum.example/cases/case%207/manifest.json");
+  EXPECT_EQ(manifest["rights"], "http://creativecommons.org/publicdomain/zero/1.0/");
+
+  change_byte(folder_ / "bag/data/case/head.glb", 100, 1);
+  const auto damaged = skullstation_cli({"exhibit", folder_ / "bag", "--out", folder_ / "new"});
+  EXPECT_EQ(damaged.exit_code, 3);
+  EXPECT_THAT(damaged.err, HasSubstr("is not as it was sealed (data/case/head.glb"));
+  EXPECT_FALSE(fs::exists(folder_ / "new"));
+}
+
 TEST_F(Evidence, MistakesAreNamed) {
-  testing::write_small_case(folder_.path());
+  write_small_case(folder_.path());
   auto words = package_words("bag");
   fs::permissions(folder_ / "keys/ed25519.key", fs::perms::others_read, fs::perm_options::add);
   const auto open_key = skullstation_cli(words);
@@ -142,16 +167,16 @@ TEST_F(Evidence, MistakesAreNamed) {
   EXPECT_THAT(no_keys.err, HasSubstr("skullstation keys create"));
   EXPECT_EQ(skullstation_cli({"verify", folder_ / "case"}).exit_code, 3);
   EXPECT_EQ(skullstation_cli({"audit", "verify", folder_ / "none"}).exit_code, 3);
-  const auto no_key = skullstation_cli({"audit", "verify", folder_ / "none", "--trust",
-                                        testing::test_keys_folder() / "certificate.pem"});
+  const auto no_key = skullstation_cli(
+      {"audit", "verify", folder_ / "none", "--trust", test_keys_folder() / "certificate.pem"});
   EXPECT_EQ(no_key.exit_code, 3);
   EXPECT_THAT(no_key.err, HasSubstr("holds no public key"));
   EXPECT_EQ(skullstation_cli({"keys", "create", folder_ / "case", "--station", "X"}).exit_code, 2);
 }
 
 TEST_F(Evidence, SurvivesBeingKilledAtRandomMomentsOfPackaging) {
-  const int kills_wanted = testing::long_form() ? 100 : 10;
-  testing::write_small_case(folder_.path(), 24'000'000);
+  const int kills_wanted = long_form() ? 100 : 10;
+  write_small_case(folder_.path(), 24'000'000);
   std::vector<std::string> command = package_words("bag");
   command.insert(command.begin(), skullstation_program().string());
   Random random(20260131);
@@ -190,4 +215,4 @@ TEST_F(Evidence, SurvivesBeingKilledAtRandomMomentsOfPackaging) {
 }
 
 }  // namespace
-}  // namespace skullstation
+}  // namespace skullstation::testing

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "core/file.h"
@@ -55,11 +56,32 @@ TriangleMesh tetrahedron(double edge_mm) {
   return mesh;
 }
 
+/// A wavy sheet whose binary STL (50 bytes a triangle) has about so many bytes.
+TriangleMesh sheet(std::size_t stl_bytes) {
+  const int squares = static_cast<int>(std::sqrt(static_cast<double>(stl_bytes) / 100.0)) + 1;
+  const int side = squares + 1;
+  TriangleMesh mesh;
+  mesh.vertices.resize(side * side, 3);
+  mesh.triangles.resize(2 * squares * squares, 3);
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      mesh.vertices.row(y * side + x) << 0.1 * x, 0.1 * y, std::sin(0.1 * x) * std::cos(0.1 * y);
+      if (x == squares || y == squares) continue;
+      const int corner = y * side + x;
+      const int first = 2 * (y * squares + x);
+      mesh.triangles.row(first) << corner, corner + 1, corner + side;
+      mesh.triangles.row(first + 1) << corner + 1, corner + side + 1, corner + side;
+    }
+  }
+  return mesh;
+}
+
 }  // namespace
 
 SealedPackage seal_small_case(const fs::path& folder, std::size_t large_bytes) {
   PackageSource source = write_small_case(folder, large_bytes);
-  check(write_mesh(tetrahedron(100.0), folder / "mesh.ply"));
+  check(
+      write_mesh(large_bytes == 0 ? tetrahedron(100.0) : sheet(large_bytes), folder / "mesh.ply"));
   replace_file(folder, folder / "reconstruction/skull.ply", read_file(folder / "mesh.ply").value());
   check(write_mesh(tetrahedron(120.0), folder / "case/head.ply"));
   check(write_file_durably(folder / "case/report.pdf", "%PDF-1.4\nodd\n%%EOF\n.."));

@@ -3,12 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
 #include "core/session/image_file.h"
+#include "daemon/evidence/bag_manifest.h"
+#include "daemon/evidence/block_list.h"
+#include "daemon/evidence/cms_signature.h"
 #include "daemon/evidence/package.h"
+#include "daemon/evidence/signature.h"
 #include "daemon/exhibit/glb_container.h"
 #include "reconstruction/io/glb.h"
 #include "tests/support/temporary_folder.h"
@@ -34,6 +39,35 @@ TriangleMesh tetrahedron(double edge_mm) {
   return mesh;
 }
 
+void set_sum(std::vector<ManifestLine>& lines, const std::string& path, const std::string& bytes) {
+  std::ranges::find(lines, path, &ManifestLine::path)->sha256 = sha256_hex(bytes);
+}
+
+/// Puts other bytes into a package and seals it anew: it is as it was sealed, though by nobody who
+/// looked at what he sealed.
+void seal_other_bytes(const fs::path& package, const std::string& path, const std::string& bytes) {
+  const auto text = [&](const char* file) { return read_file(package / file).value(); };
+  const auto put = [&](const char* file, const std::string& content) {
+    ASSERT_TRUE(write_file_durably(package / file, content));
+  };
+  put(path.c_str(), bytes);
+  auto payload = parse_manifest(text(manifest_file), "").value();
+  set_sum(payload, path, bytes);
+  put(manifest_file, format_manifest(payload));
+  auto blocks = parse_block_list(text(blocks_file), "").value();
+  blocks[path] = {bytes.size(), sha256_hex(bytes), {sha256_hex(bytes)}};
+  put(blocks_file, format_block_list(blocks));
+  auto tags = parse_manifest(text(tag_manifest_file), "").value();
+  for (const char* file : {manifest_file, blocks_file}) set_sum(tags, file, text(file));
+  put(tag_manifest_file, format_manifest(tags));
+  const std::string sealed = text(tag_manifest_file);
+  put(ed25519_file, ed25519_sign(testing::test_keys(), sealed));
+  put(cms_file, cms_sign(testing::test_keys(), sealed, SimulatedClock().utc_now()).value());
+  auto signatures = parse_manifest(text(signature_sums_file), "").value();
+  for (const char* file : {ed25519_file, cms_file}) set_sum(signatures, file, text(file));
+  put(signature_sums_file, format_manifest(signatures));
+}
+
 class ExhibitTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -47,14 +81,20 @@ class ExhibitTest : public ::testing::Test {
     ASSERT_TRUE(
         write_file_durably(folder_ / "case/preview_face_front.png", encode_png(Image8(40, 30, 3))));
     label_ = {"Museum of Bones", "© Museum of Bones, CC BY-NC 4.0",
-              "https://creativecommons.org/licenses/by-nc/4.0/",
-              "https://museum.example/cases/2026-0042/"};
+              "https://creativecommons.org/licenses/by-nc/4.0/", "https://museum.example/cases"};
   }
   Result<std::vector<std::string>> exhibit() {
     const auto sealed = write_package(source_, testing::test_keys(), std::nullopt, "test",
                                       SimulatedClock(), folder_ / "package", 1);
     if (!sealed) return forward(sealed);
     return write_exhibit(folder_ / "package", label_, "1.2.3", folder_ / "exhibit");
+  }
+  std::string refused() {
+    const auto shown = write_exhibit(folder_ / "package", label_, "1.2.3", folder_ / "new");
+    if (shown) return "it was shown";
+    EXPECT_FALSE(fs::exists(folder_ / "new"));
+    EXPECT_EQ(shown.error().kind, ErrorKind::bad_input);
+    return shown.error().message();
   }
   json shown(const char* file) { return json::parse(*read_file(folder_ / "exhibit" / file)); }
 
@@ -119,15 +159,35 @@ TEST_F(ExhibitTest, TheSceneHoldsBothInOneFrame) {
 TEST_F(ExhibitTest, TheManifestIsWrittenWhereItsAddressIsKnown) {
   ASSERT_TRUE(exhibit());
   const json manifest = shown("manifest.json");
-  EXPECT_EQ(manifest["id"], "https://museum.example/cases/2026-0042/manifest.json");
+  EXPECT_EQ(manifest["id"], "https://museum.example/cases/exhibit/manifest.json");
   EXPECT_EQ(manifest["type"], "Manifest");
-  EXPECT_EQ(manifest["rights"], label_.rights_url);
+  EXPECT_EQ(manifest["rights"], "http://creativecommons.org/licenses/by-nc/4.0/")
+      << "as the registry spells it";
   EXPECT_EQ(manifest["requiredStatement"]["value"]["en"][0], label_.rights);
-  EXPECT_EQ(manifest["rendering"][1]["id"], "https://museum.example/cases/2026-0042/head.glb");
+  EXPECT_EQ(manifest["rendering"][1]["id"], "https://museum.example/cases/exhibit/head.glb");
   const json canvas = manifest["items"][0];
   EXPECT_EQ(canvas["width"], 40);
   EXPECT_EQ(canvas["items"][0]["items"][0]["target"], canvas["id"]);
   EXPECT_EQ(canvas["items"][0]["items"][0]["body"]["height"], 30);
+}
+
+TEST_F(ExhibitTest, ALicenceOfNoRegistryIsToldButNotAsRights) {
+  label_.rights_url = "https://museum.example/licence";
+  ASSERT_TRUE(exhibit());
+  const json manifest = shown("manifest.json");
+  EXPECT_FALSE(manifest.contains("rights"));
+  EXPECT_THAT(manifest["metadata"].dump(), HasSubstr(label_.rights_url));
+}
+
+TEST_F(ExhibitTest, NamesOfAnyKindBecomeAddresses) {
+  ASSERT_TRUE(write_file_durably(folder_ / "case/preview_from left #1.png",
+                                 *read_file(folder_ / "case/preview_face_front.png")));
+  ASSERT_TRUE(exhibit());
+  ASSERT_TRUE(write_exhibit(folder_ / "package", label_, "1.2.3", folder_ / "Schädel 7/"));
+  const json manifest = json::parse(*read_file(folder_ / "Schädel 7/manifest.json"));
+  EXPECT_EQ(manifest["id"], "https://museum.example/cases/Sch%C3%A4del%207/manifest.json");
+  EXPECT_EQ(manifest["items"][1]["items"][0]["items"][0]["body"]["id"],
+            "https://museum.example/cases/Sch%C3%A4del%207/preview_from%20left%20%231.png");
 }
 
 TEST_F(ExhibitTest, WithoutWordsNothingIsSaidAndWithoutReconstructionTheHeadIsAlone) {
@@ -147,16 +207,36 @@ TEST_F(ExhibitTest, WhatIsNotAsItWasSealedIsNotShown) {
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().kind, ErrorKind::usage);
   testing::change_byte(folder_ / "package/data/case/head.glb", 30, 1);
-  const auto changed = write_exhibit(folder_ / "package", label_, "1.2.3", folder_ / "new");
-  ASSERT_FALSE(changed);
-  EXPECT_THAT(changed.error().message(), HasSubstr("is not as it was sealed (data/case/head.glb"));
-  EXPECT_FALSE(fs::exists(folder_ / "new"));
+  EXPECT_THAT(refused(), HasSubstr("is not as it was sealed (data/case/head.glb"));
+}
+
+TEST_F(ExhibitTest, ASealedRecordThatIsNoCaseIsNamed) {
+  ASSERT_TRUE(exhibit());
+  const std::string record = "data/case/case.json";
+  for (const auto& [bytes, words] :
+       {std::pair("[]", "case.json: is no JSON object"), std::pair("7", "is no JSON object"),
+        std::pair(R"({"format":)", "case.json: line 1, column 10: is not valid JSON"),
+        std::pair(R"({"model":{},"model":{}})", "has the key \"model\" twice"),
+        std::pair(R"({"model":7})", "has a \"model\" that is no JSON object"),
+        std::pair(R"({"model":null})", "has a \"model\" that is no JSON object")}) {
+    seal_other_bytes(folder_ / "package", record, bytes);
+    EXPECT_THAT(refused(), HasSubstr(words)) << bytes;
+  }
+  // Odd, but nothing that is shown depends on it.
+  for (const char* bytes : {"{}", R"({"warnings":7,"model":{"card":[]},"anatomical_from_input":7})",
+                            R"({"anatomical_from_input":[[1,0,0,"x"]]})"}) {
+    seal_other_bytes(folder_ / "package", record, bytes);
+    EXPECT_EQ(refused(), "it was shown") << bytes;
+    fs::remove_all(folder_ / "new");
+  }
 }
 
 TEST_F(ExhibitTest, ACaseWithAHeadThatIsNoModelIsNamed) {
+  auto odd = split_glb(*read_file(folder_ / "case/head.glb"), "head.glb").value();
+  odd.gltf["asset"] = json::array();
   for (const std::string& bytes :
        {std::string("not a model"), std::string("glTF\2\0\0\0\x14\0\0\0\xff\0\0\0JSON", 20),
-        read_file(folder_ / "case/head.glb")->substr(0, 100)}) {
+        read_file(folder_ / "case/head.glb")->substr(0, 100), join_glb(odd)}) {
     ASSERT_TRUE(write_file_durably(folder_ / "case/head.glb", bytes));
     fs::remove_all(folder_ / "package");
     const auto shown = exhibit();
