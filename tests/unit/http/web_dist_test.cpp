@@ -66,7 +66,7 @@ TEST(WebMessages, AreTheSameInBothLanguages) {
 std::string program_text() {
   std::string all;
   for (const char* folder :
-       {"capture/scan", "daemon/jobs", "daemon/service", "daemon/station", "firmware_io"}) {
+       {"capture", "daemon/jobs", "daemon/service", "daemon/station", "firmware_io"}) {
     for (const auto& entry :
          fs::recursive_directory_iterator(fs::path(SKULLSTATION_SOURCE_DIR) / folder)) {
       if (entry.path().extension() == ".cpp") all += *read_file(entry.path());

@@ -18,7 +18,6 @@ function instruction(station: Station): string {
     if (message.includes("upright")) return t("says.upright");
     return says(message);
   }
-  if (station.state === "fault") return `${says(station.message)} ${t("do.fault")}`;
   return t(`do.${idle.includes(station.state) ? "ready" : station.state}` as Key);
 }
 
@@ -31,7 +30,7 @@ function remark(station: Station): string {
 
 function stateBox(station: Station): HTMLElement {
   const kind = { fault: "bad", stopped: "bad", scanning: "busy", starting: "busy", "turn-over": "busy" }[station.state as string] ?? "good";
-  return h("div", { class: `state ${kind}`, role: "status" }, h("h1", {}, word("state", station.state)), h("p", {}, instruction(station)));
+  return h("div", { class: `state ${kind}`, role: "status" }, h("h1", {}, word("state", station.state)), h("div", {}, station.state === "fault" && h("p", {}, stationSays(station.message)), h("p", {}, instruction(station))));
 }
 
 interface Part {
