@@ -38,7 +38,7 @@ export function word(group: string, name: string): string {
 
 /** What the station itself says, as patterns: its sentences have names, numbers and one another in them. */
 const sentences = Object.entries(stationDe).map(([english, german]) => ({
-  pattern: new RegExp(`^${english.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{(\w+)\}/g, "(?<$1>.+?)")}$`, "s"),
+  pattern: new RegExp(`^${english.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{(\w+)\}/g, "(?<$1>.+)")}$`, "s"),
   german,
 }));
 

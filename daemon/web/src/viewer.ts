@@ -241,6 +241,7 @@ export class Viewer {
 
   /** Where a point of the canvas (-1 to 1) meets a surface, without the side's shift. */
   pick(x: number, y: number): Vector3 | null {
+    this.scene.updateMatrixWorld();  // it may have been turned since it was drawn
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(x, y), this.camera);
     const hit = ray.intersectObjects(this.sides, true)[0];
