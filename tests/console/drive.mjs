@@ -29,8 +29,9 @@ context.on("request", (request) => {
 });
 context.on("weberror", (error) => complaints.push(String(error.error())));
 context.on("console", (message) => {
-  // Looked for and not there: a preview while the cameras work, a session before the sign-in.
-  if (message.type() === "error" && !/status of (401|403|500|503)/.test(message.text())) complaints.push(message.text());
+  // Looked for and not there: a preview while the cameras work, a session before the sign-in, a scan that has just ended.
+  const usual = /status of (401|403|500|503)/.test(message.text()) || message.location().url.endsWith("/station/scan");
+  if (message.type() === "error" && !usual) complaints.push(`${message.text()} ${message.location().url}`);
 });
 const page = await context.newPage();
 
