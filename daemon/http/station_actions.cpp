@@ -152,12 +152,14 @@ Response preview(Console& console, Call& call) {
     return refusal(seen.error());
   }
   const ViewQuality& quality = seen->quality;
+  const QualityGates& gates = console.service.config().gates;
   Json about = {{"camera", camera},
                 {"taken", seen->taken},
                 {"sharpness", quality.sharpness},
                 {"clipped_percent", quality.clipped_percent},
                 {"dark_percent", quality.dark_percent},
                 {"mean_level", quality.mean_level},
+                {"mean_level_allowed", {gates.min_mean_level, gates.max_mean_level}},
                 {"specimen_percent", quality.specimen_percent},
                 {"border_percent", quality.border_percent},
                 {"board_corners", quality.board_corners}};

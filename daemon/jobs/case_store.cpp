@@ -185,6 +185,15 @@ Result<void> CaseStore::note(std::int64_t case_id, const std::string& what) {
       .done();
 }
 
+Result<void> CaseStore::note_once(std::int64_t case_id, const std::string& what) {
+  const std::lock_guard lock(mutex_);
+  Statement noted = database_.statement("SELECT 1 FROM events WHERE case_id = ? AND what = ?");
+  noted.bind(case_id).bind(what);
+  if (noted.next()) return {};
+  if (auto read = noted.done(); !read) return read;
+  return note(case_id, what);
+}
+
 fs::path CaseStore::scan_folder(std::int64_t case_id) const {
   return folder_ / "scans" / fmt::format("{}", case_id);
 }
@@ -533,6 +542,30 @@ std::vector<std::string> CaseStore::damage(bool thorough) {
   }
   for (const ArtifactFile& file : all) {
     if (auto sound = blobs_.check(file, thorough); !sound) found.push_back(sound.error().message());
+  }
+  return found;
+}
+
+Result<std::vector<std::string>> CaseStore::check_case(std::int64_t case_id,
+                                                       const std::stop_token& stop) {
+  const auto all = jobs(case_id);
+  if (!all) return forward(all);
+  std::vector<std::string> found;
+  for (const Job& job : *all) {
+    const auto list = files(job.id);
+    if (!list) return forward(list);
+    for (const ArtifactFile& file : *list) {
+      if (stop.stop_requested()) return found;
+      if (blobs_.check(file, true)) continue;
+      // Again while nothing is taken in or deleted: a scan must not wait for the reading of all.
+      const std::lock_guard blobs_lock(blobs_mutex_);
+      const auto still = files(job.id);
+      if (!still) return forward(still);
+      const auto sound = blobs_.check(file, true);
+      if (sound || std::ranges::find(*still, file) == still->end()) continue;
+      found.push_back(sound.error().message());
+      if (auto noted = note_once(case_id, found.back()); !noted) return forward(noted);
+    }
   }
   return found;
 }

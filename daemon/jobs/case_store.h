@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -166,6 +167,9 @@ class CaseStore {
   Result<std::vector<std::int64_t>> remove_expired(std::chrono::seconds term);
   /// Everything that is wrong: database, missing files and, if `thorough`, their content.
   std::vector<std::string> damage(bool thorough);
+  /// Reads every file of a case and returns what is wrong with them; it is noted once in the case's
+  /// events, too. Files that are deleted meanwhile are not damaged.
+  Result<std::vector<std::string>> check_case(std::int64_t case_id, const std::stop_token& stop);
 
   const std::filesystem::path& folder() const { return folder_; }
 
@@ -180,6 +184,7 @@ class CaseStore {
                                const std::map<std::string, std::int64_t>& inputs);
   Result<void> name_files(std::int64_t job, const std::vector<ArtifactFile>& files);
   Result<void> note(std::int64_t case_id, const std::string& what);
+  Result<void> note_once(std::int64_t case_id, const std::string& what);
   Result<std::vector<Job>> jobs_where(const std::string& condition, std::int64_t value,
                                       const std::string& order = "id");
   Result<std::vector<Case>> cases_where(const std::string& condition, std::int64_t value);

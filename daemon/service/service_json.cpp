@@ -34,6 +34,7 @@ Json case_json(StationService& service, const Case& row) {
   if (row.hold) json["hold"] = *row.hold;
   if (row.verified) json["verified"] = *row.verified;
   if (row.removed) json["removed"] = *row.removed;
+  if (const auto damage = service.damage_of(row.id); !damage.empty()) json["damage"] = damage;
   const auto left = service.engine().time_left(row.id);
   if (row.state == CaseState::building && left && *left) json["seconds_left"] = (*left)->count();
   return json;

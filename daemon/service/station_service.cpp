@@ -2,6 +2,9 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <malloc.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -163,8 +166,15 @@ std::vector<Finding> StationService::check() {
   return findings.list;
 }
 
+std::vector<std::string> StationService::damage_of(std::int64_t case_id) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = damage_.find(case_id);
+  return found == damage_.end() ? std::vector<std::string>{} : found->second;
+}
+
 void StationService::run(const std::stop_token& stop, const std::function<void()>& alive) {
   act(StationAction::open);
+  files_ = std::jthread([this](const std::stop_token& ended) { watch_files(ended); });
   auto next_removal = clock_.now();
   while (status().state != StationState::stopped) {
     alive();
@@ -268,6 +278,8 @@ void StationService::open_parts(bool reset) {
       const std::lock_guard lock(mutex_);
       station_ = std::make_unique<Station>(*std::move(opened));
     }
+    // A simulated room needs several times as much while it is being built.
+    ::malloc_trim(0);
     Interlock& interlock = *station_->hardware.interlock;
     interlock.on_trip([this, &interlock] {
       tell(interlock.reason() == door_open ? StationEvent::door_opened
@@ -474,6 +486,27 @@ void StationService::watch_cameras(const std::stop_token& stop) {
     if (trouble.empty() && lost) tell(StationEvent::camera_back);
     lost = !trouble.empty();
   }
+}
+
+/// Disks forget. Every file of every case is read after each start and then once a week, as slowly
+/// as whoever else needs the machine wants.
+void StationService::watch_files(const std::stop_token& stop) {
+  constexpr auto period = std::chrono::hours(7 * 24);
+  static_cast<void>(::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), 19));
+  do {
+    const auto cases = store_->cases();
+    if (!cases) log(cases.error().message());
+    for (const Case& row : cases.value_or(std::vector<Case>{})) {
+      auto damage = store_->check_case(row.id, stop);
+      if (stop.stop_requested()) return;
+      if (!damage) damage = std::vector{damage.error().message()};
+      for (const std::string& words : *damage) {
+        log(fmt::format("case {}: {}", row.number, words));
+      }
+      const std::lock_guard lock(mutex_);
+      damage_[row.id] = *std::move(damage);
+    }
+  } while (clock_.sleep_for(period, stop));
 }
 
 void StationService::remove_expired() {

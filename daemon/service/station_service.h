@@ -5,6 +5,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -78,6 +79,8 @@ class StationService {
   Result<CameraPreview> preview(const std::string& camera);
   /// The computer and the open station, as `skullstation doctor` sees them.
   std::vector<Finding> check();
+  /// What is wrong with a case's files, as far as they have been read since the start.
+  std::vector<std::string> damage_of(std::int64_t case_id) const;
 
   CaseStore& store() { return *store_; }
   JobEngine& engine() { return *engine_; }
@@ -112,6 +115,7 @@ class StationService {
   Result<void> ask_for_placement(const PlacementRequest& request, const std::stop_token& stop);
   void watch_button(const std::stop_token& stop);
   void watch_cameras(const std::stop_token& stop);
+  void watch_files(const std::stop_token& stop);
   void remove_expired();
   void say(std::string message);
   void log(std::string words);
@@ -132,6 +136,7 @@ class StationService {
   std::uint64_t logged_ = 0;
   StationStatus status_;
   std::string next_number_;
+  std::map<std::int64_t, std::vector<std::string>> damage_;  // by case
   std::unique_ptr<Station> station_;  // set once; its parts are safe for their own threads
   bool confirmed_ = false;            // the placement, by a person
   bool given_up_ = false;             // the scan, by a person
@@ -142,6 +147,7 @@ class StationService {
   std::jthread worker_;  // opens the station, scans
   std::jthread button_;
   std::jthread cameras_;
+  std::jthread files_;
   std::unique_ptr<JobEngine> engine_;  // last: it tells this object
 };
 

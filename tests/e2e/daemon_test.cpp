@@ -1,5 +1,6 @@
 // `skullstationd` on a small simulated station, with steps that are quick: from the button to the
-// result, the next specimen meanwhile, what a person at the station can do wrong, and kill -9.
+// result, the next specimen meanwhile, what a person at the station can do wrong and what a step
+// can. That it is killed, or its disk full, is in console_crash_test.cpp.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -16,9 +17,8 @@
 #include <thread>
 
 #include "core/file.h"
-#include "core/random.h"
 #include "tests/e2e/small_station.h"
-#include "tests/support/https_client.h"
+#include "tests/support/console_user.h"
 #include "tests/support/process.h"
 #include "tests/support/steps.h"
 #include "tests/support/temporary_folder.h"
@@ -53,29 +53,11 @@ class Daemon : public ::testing::Test {
   /// Writes the configuration: a turntable that is quick in real time.
   void configure(const std::string& camera = "", const std::string& station = "",
                  const std::string& extra = "[http]\nenabled = false\n") {
-    skullstation::testing::SmallStation small;
-    small.views_per_ring = 2;
-    small.camera = camera;
-    small.extra =
-        "[turntable]\nsteps_per_turn = 200\nmax_speed_deg_s = 1000\n"
-        "max_acceleration_deg_s2 = 20000\nmax_jerk_deg_s3 = 2000000\nhome_speed_deg_s = 700\n" +
-        extra;
-    config_ = write_small_station(folder_.path(), small);
-    auto text = *read_file(config_);
-    text.insert(text.find("[scan]\n") + 7, "settle_ms = 0\n");
-    text.insert(text.find("[station]\n") + 10, station);
-    ASSERT_TRUE(write_file_durably(config_, text));
+    config_ = skullstation::testing::write_quick_station(folder_.path(), camera, station, extra);
   }
 
   std::vector<std::string> command() const {
-    const auto bin = skullstation::testing::skullstation_program().parent_path();
-    return {(bin / "skullstationd").string(),
-            "--config",
-            config_.string(),
-            "--storage",
-            storage().string(),
-            "--step-program",
-            (bin / "fake_step").string()};
+    return skullstation::testing::daemon_command(config_, storage());
   }
   fs::path storage() const { return folder_ / "store"; }
   void start() { daemon_ = std::make_unique<Process>(command()); }
@@ -169,6 +151,10 @@ class Daemon : public ::testing::Test {
     EXPECT_TRUE(fs::exists(arrived[0] / "data/session/session.json"));
     return shown["audit_entry"]["who"];
   }
+  /// What the next steps do, as options of fake_step.
+  void let_steps(const json& options) const {
+    ASSERT_TRUE(write_file_durably(storage() / "step-options", options.dump()));
+  }
   /// Steps wait as long as this file is there.
   void hold_steps() { std::ofstream(folder_ / "store" / "hold-steps") << "x"; }
   void release_steps() { fs::remove(folder_ / "store" / "hold-steps"); }
@@ -242,35 +228,19 @@ TEST_F(Daemon, WhatAnExaminerApprovesIsSealedAndDeliveredThroughKills) {
     return text.substr(at, text.find(end, at) - at);
   };
   const std::string port = told("https://localhost:", "/");
-  const std::string from_here =
-      fmt::format("Origin: https://localhost:{}\r\nContent-Type: application/json\r\n", port);
-  testing::HttpsClient client(static_cast<std::uint16_t>(std::stoi(port)));
-  const auto first = client.ask(
-      "POST", "/api/v1/setup", from_here,
-      json{{"code", told("set-up code: ", " ")}, {"name", "root"}, {"password", "correct horse"}}
-          .dump());
-  ASSERT_EQ(first.status, 201) << first.body;
-  std::string cookie;
-  std::string csrf;
-  const auto sign_in = [&](const testing::HttpsAnswer& answer) {
-    cookie = answer.headers.at("set-cookie").substr(0, answer.headers.at("set-cookie").find(';'));
-    csrf = json::parse(answer.body)["csrf"];
-  };
-  const auto post = [&](const std::string& path, const json& body) {
-    return client.ask("POST", "/api/v1" + path,
-                      from_here + fmt::format("Cookie: {}\r\nX-CSRF-Token: {}\r\n", cookie, csrf),
-                      body.dump());
-  };
-  sign_in(first);
-  ASSERT_EQ(
-      post("/accounts", {{"name", "dr.bone"}, {"role", "examiner"}, {"password", "long enough"}})
-          .status,
-      201);
-  sign_in(post("/session", {{"name", "dr.bone"}, {"password", "long enough"}}));
+  testing::ConsoleUser user;
+  ASSERT_TRUE(user.connect(static_cast<std::uint16_t>(std::stoi(port))));
+  ASSERT_TRUE(user.sign_in(
+      "/setup",
+      {{"code", told("set-up code: ", " ")}, {"name", "root"}, {"password", "correct horse"}}));
+  const json account = {{"name", "dr.bone"}, {"role", "examiner"}, {"password", "long enough"}};
+  ASSERT_EQ(user.ask("POST", "/accounts", account).status, 201);
+  ASSERT_TRUE(user.sign_in("/session", {{"name", "dr.bone"}, {"password", "long enough"}}));
   std::this_thread::sleep_for(1200ms);
   EXPECT_TRUE(fs::is_empty(folder_ / "records")) << "nobody has approved it";
   hold_steps();
-  const auto approved = post("/cases/1/approval", {{"job", job(1, "approximate")["id"]}});
+  const auto approved =
+      user.ask("POST", "/cases/1/approval", {{"job", job(1, "approximate")["id"]}});
   ASSERT_EQ(approved.status, 200) << approved.body;
   ASSERT_TRUE(
       skullstation::testing::comes_true([&] { return job(1, "seal")["state"] == "running"; }));
@@ -338,7 +308,7 @@ TEST_F(Daemon, ACaseThatFailsLeavesTheStationReady) {
   configure();
   start();
   ASSERT_TRUE(becomes("ready"));
-  std::ofstream(storage() / "fail-steps") << "x";
+  let_steps({{"do", "fail"}});
   ask("press");
   ASSERT_TRUE(becomes("turn-over"));
   ask("press");
@@ -347,7 +317,7 @@ TEST_F(Daemon, ACaseThatFailsLeavesTheStationReady) {
   EXPECT_EQ(cases()[0]["state"], "failed");
   const json failed = job(1, "reconstruct");
   EXPECT_THAT(failed["error"].get<std::string>(), HasSubstr("made of cheese"));
-  fs::remove(storage() / "fail-steps");
+  let_steps(json::object());
   EXPECT_EQ(ask(fmt::format("retry {}", failed["id"].get<int>()))["ok"], true);
   EXPECT_TRUE(skullstation::testing::comes_true([&] { return cases()[0]["state"] == "done"; }));
   end();
@@ -362,48 +332,61 @@ TEST_F(Daemon, AnUnpluggedCameraIsToldOfBeforeTheNextScan) {
   end();
 }
 
-TEST_F(Daemon, SurvivesKillsDuringAScan) {
+TEST_F(Daemon, ADamagedFileIsNamedWithItsCaseAfterTheNextStart) {
   configure();
-  const char* wish = std::getenv("SKULLSTATION_LONG");
-  const int kills = wish != nullptr && std::string(wish) == "1" ? 40 : 4;
-  Random random(20260131);
-  for (int kill = 0; kill < kills; ++kill) {
-    start();
-    ASSERT_TRUE(skullstation::testing::comes_true(
-        [&] {
-          const std::string now = state();
-          return now == "ready" || now == "turn-over" || now == "building" || now == "result";
-        },
-        300s));
-    ask("press");
-    std::this_thread::sleep_for(std::chrono::milliseconds(random.below(400)));
-    daemon_->send(SIGKILL);
-    daemon_->wait();
-  }
   start();
-  // Whatever was under way is finished at the button.
-  ASSERT_TRUE(skullstation::testing::comes_true(
-      [&] {
-        const std::string now = state();
-        if (now == "turn-over") ask("go");  // at once, and nothing in any other state but ready
-        if (now != "ready" && now != "result") return false;
-        for (const json& row : cases()) {
-          if (row["state"] == "building" || row["state"] == "scanning") return false;
-        }
-        return true;
-      },
-      300s));
-  for (const json& row : cases()) {
-    EXPECT_TRUE(row["state"] == "done" || row["state"] == "cancelled") << row.dump();
-    if (row["state"] == "done") {
-      EXPECT_EQ(views_of(row["id"]), 8U);
-    }
-  }
+  scan_one();
+  const json files = ask(fmt::format("files {}", job(1, "scan")["id"].get<int>()))["files"];
   end();
-  const SystemClock clock;
-  const auto store = CaseStore::open(storage(), clock, "test");
-  ASSERT_TRUE(store) << store.error().message();
-  EXPECT_THAT((*store)->damage(true), ::testing::IsEmpty());
+  const fs::path blob = files[0]["blob"].get<std::string>();
+  std::string bytes = *read_file(blob);
+  bytes[bytes.size() / 2] ^= 1;
+  fs::remove(blob);  // it is read-only
+  std::ofstream(blob, std::ios::binary) << bytes;
+  start();
+  ASSERT_TRUE(becomes("ready"));
+  ASSERT_TRUE(skullstation::testing::comes_true([&] { return cases()[0].contains("damage"); }));
+  EXPECT_THAT(cases()[0]["damage"][0].get<std::string>(),
+              HasSubstr("is damaged: " + files[0]["path"].get<std::string>()));
+  end();
+}
+
+TEST_F(Daemon, AStepThatCrashesHangsOrEatsMemoryFailsItsCaseAlone) {
+  configure();
+  auto text = *read_file(config_) + "[jobs]\nmemory_mib = 256\n";
+  ASSERT_TRUE(write_file_durably(config_, text));
+  start();
+  ASSERT_TRUE(becomes("ready"));
+  let_steps({{"do", "segfault"}});
+  ask("press");
+  ASSERT_TRUE(becomes("turn-over"));
+  ask("press");
+  ASSERT_TRUE(becomes("result"));
+  const int id = job(1, "reconstruct")["id"];
+  const auto error = [&] { return job(1, "reconstruct")["error"].get<std::string>(); };
+  EXPECT_THAT(error(), HasSubstr("Segmentation fault"));
+
+  let_steps({{"do", "eat memory"}});
+  ask(fmt::format("retry {}", id));
+  ASSERT_TRUE(skullstation::testing::comes_true(
+      [&] { return error().find("bad_alloc") != std::string::npos; }));
+  EXPECT_EQ(cases()[0]["state"], "failed");
+
+  let_steps({{"do", "hang"}});  // and won't listen
+  ask(fmt::format("retry {}", id));
+  ASSERT_TRUE(skullstation::testing::comes_true(
+      [&] { return ask("status").value("job", json::object()).value("stage", "") == "half way"; }));
+  let_steps(json::object());
+  ask("press");  // the station is ready for the next specimen all the while
+  ASSERT_TRUE(becomes("turn-over"));
+  ask("press");
+  ASSERT_TRUE(becomes("building"));
+  ask(fmt::format("cancel-job {}", id));
+  EXPECT_TRUE(skullstation::testing::comes_true([&] { return cases()[1]["state"] == "done"; }));
+  EXPECT_EQ(cases()[0]["state"], "cancelled");
+  EXPECT_EQ(ask(fmt::format("retry {}", id))["ok"], true);
+  EXPECT_TRUE(skullstation::testing::comes_true([&] { return cases()[0]["state"] == "done"; }));
+  end();
 }
 
 TEST_F(Daemon, TellsSystemdThatItIsReadyAndAlive) {

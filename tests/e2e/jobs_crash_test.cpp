@@ -5,10 +5,6 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sched.h>
-#include <sys/mount.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
@@ -20,6 +16,7 @@
 #include "core/file.h"
 #include "core/random.h"
 #include "tests/support/process.h"
+#include "tests/support/small_disk.h"
 #include "tests/support/steps.h"
 #include "tests/support/temporary_folder.h"
 
@@ -155,30 +152,6 @@ TEST(JobsCrash, WhatWasAcknowledgedSurvivesKillsAtRandomMoments) {
   RecordProperty("cases_saved", static_cast<int>(told.saved.size()));
 }
 
-/// Runs the body in a process of its own that sees a small file system at `folder`; false where the
-/// kernel does not allow this.
-bool on_small_disk(const fs::path& folder, const std::function<void()>& body) {
-  constexpr int not_allowed = 77;
-  std::fflush(nullptr);
-  const pid_t child = ::fork();
-  if (child == 0) {
-    const int spaces = CLONE_NEWNS | (::geteuid() == 0 ? 0 : CLONE_NEWUSER);
-    if (::unshare(spaces) != 0 ||
-        ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
-        ::mount("tmpfs", folder.c_str(), "tmpfs", 0, "size=4m,mode=700") != 0) {
-      ::_exit(not_allowed);
-    }
-    body();
-    std::fflush(nullptr);
-    ::_exit(::testing::Test::HasFailure() ? 1 : 0);
-  }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == not_allowed) return false;
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << "see above";
-  return true;
-}
-
 /// Takes all but `free` bytes of the file system.
 void fill(const fs::path& file, std::uint64_t free) {
   const std::uint64_t bytes = *free_space_bytes(file.parent_path()) - free;
@@ -246,7 +219,8 @@ Reached live_on(const fs::path& disk, std::uint64_t free) {
 
 TEST(JobsCrash, AFullDiskLosesNothingWhateverWriteItHits) {
   const TemporaryFolder folder;
-  const bool allowed = on_small_disk(folder.path(), [&] {
+  constexpr std::uint64_t disk_bytes = 4 << 20;
+  const bool allowed = testing::on_small_disk(folder.path(), disk_bytes, [&] {
     int opened = 0;
     int saved = 0;
     int made = 0;

@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "reconstruction/io/ply.h"
+#include "tests/support/process.h"
 
 namespace skullstation::testing {
 
@@ -76,6 +77,36 @@ std::filesystem::path write_small_station(const std::filesystem::path& folder,
     throw std::runtime_error("can't write " + file.string());
   }
   return file;
+}
+
+std::filesystem::path write_quick_station(const std::filesystem::path& folder,
+                                          const std::string& camera, const std::string& station,
+                                          const std::string& extra) {
+  SmallStation small;
+  small.views_per_ring = 2;
+  small.camera = camera;
+  small.extra =
+      "[turntable]\nsteps_per_turn = 200\nmax_speed_deg_s = 1000\n"
+      "max_acceleration_deg_s2 = 20000\nmax_jerk_deg_s3 = 2000000\nhome_speed_deg_s = 700\n" +
+      extra;
+  const auto file = write_small_station(folder, small);
+  auto text = read_file(file).value_or("");
+  text.insert(text.find("[scan]\n") + 7, "settle_ms = 0\n");
+  text.insert(text.find("[station]\n") + 10, station);
+  if (!write_file_durably(file, text)) throw std::runtime_error("can't write " + file.string());
+  return file;
+}
+
+std::vector<std::string> daemon_command(const std::filesystem::path& config,
+                                        const std::filesystem::path& storage) {
+  const auto bin = skullstation_program().parent_path();
+  return {(bin / "skullstationd").string(),
+          "--config",
+          config.string(),
+          "--storage",
+          storage.string(),
+          "--step-program",
+          (bin / "fake_step").string()};
 }
 
 }  // namespace skullstation::testing

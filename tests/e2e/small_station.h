@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace skullstation::testing {
 
@@ -17,5 +18,17 @@ struct SmallStation {
 };
 std::filesystem::path write_small_station(const std::filesystem::path& folder,
                                           const SmallStation& station = {});
+
+/// The same for a daemon that is to be quick in real time: 2 views a ring, and a turntable that
+/// needs a blink. `camera` goes into the first camera's [camera.simulated], `station` into
+/// [station], `extra` to the file's end.
+std::filesystem::path write_quick_station(const std::filesystem::path& folder,
+                                          const std::string& camera = "",
+                                          const std::string& station = "",
+                                          const std::string& extra = "");
+
+/// `skullstationd` of this build, with fake_step (tests/support/fake_step.cpp) for its steps.
+std::vector<std::string> daemon_command(const std::filesystem::path& config,
+                                        const std::filesystem::path& storage);
 
 }  // namespace skullstation::testing

@@ -75,19 +75,22 @@ int main(int count, char** words) {
   const std::string name = words[1];
   const fs::path folder = words[2];
   const Json request = Json::parse(content(folder / "request.json"));
-  const Json options = request["options"];
+  Json options = request["options"];
+  // A daemon's steps have options of their own; a file in its storage, two levels up, adds more.
+  const fs::path storage = folder.parent_path().parent_path();
+  if (const std::string more = content(storage / "step-options"); !more.empty()) {
+    options.update(Json::parse(more));
+  }
   const fs::path out = request["out"].get<std::string>();
   if (options.contains("claim")) claim(options["claim"]);
   std::printf("{\"fraction\": 0.5, \"stage\": \"half way\"}\n");
   std::fflush(stdout);
   std::this_thread::sleep_for(std::chrono::milliseconds(options.value("sleep_ms", 0)));
 
-  // In a daemon's storage, two levels up, files stand for options.
-  const fs::path storage = folder.parent_path().parent_path();
   while (fs::exists(storage / "hold-steps")) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  const std::string what = fs::exists(storage / "fail-steps") ? "fail" : options.value("do", "");
+  const std::string what = options.value("do", "");
   if (what == "fail") {
     std::fprintf(stderr, "fake_step: the skull is made of cheese\n");
     return options.value("code", 5);

@@ -26,11 +26,12 @@ struct HttpsClient::Parts {
   }
 };
 
-HttpsClient::HttpsClient(std::uint16_t port) : parts_(std::make_unique<Parts>()), port_(port) {
+HttpsClient::HttpsClient(std::uint16_t port, std::chrono::seconds patience)
+    : parts_(std::make_unique<Parts>()), port_(port) {
   std::signal(SIGPIPE, SIG_IGN);  // a server that hangs up is what some tests are about
-  const timeval patience{5, 0};
-  ::setsockopt(parts_->socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-  ::setsockopt(parts_->socket, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+  const timeval wait{patience.count(), 0};
+  ::setsockopt(parts_->socket, SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait);
+  ::setsockopt(parts_->socket, SOL_SOCKET, SO_SNDTIMEO, &wait, sizeof wait);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -13,11 +14,11 @@ struct HttpsAnswer {
   std::string body;
 };
 
-/// A TLS connection to a server on this machine, which it does not check. Each wait ends after
-/// five seconds.
+/// A TLS connection to a server on this machine, which it does not check. Each wait ends when
+/// patience does.
 class HttpsClient {
  public:
-  explicit HttpsClient(std::uint16_t port);
+  explicit HttpsClient(std::uint16_t port, std::chrono::seconds patience = std::chrono::seconds(5));
   ~HttpsClient();
   HttpsClient(const HttpsClient&) = delete;
   HttpsClient& operator=(const HttpsClient&) = delete;

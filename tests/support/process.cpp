@@ -60,14 +60,13 @@ bool Process::wait_for(std::chrono::milliseconds time) {
   return true;
 }
 
-std::string Process::err_so_far() const { return read_file(folder_ / "err").value_or(""); }
-
 ProcessResult Process::wait() {
   int status = 0;
   if (!ended_ && ::waitpid(pid_, &status, 0) == pid_) take_status(status);
-  return {exit_code_, read_file(folder_ / "out").value_or(""),
-          read_file(folder_ / "err").value_or("")};
+  return {exit_code_, read_file(folder_ / "out").value_or(""), err_so_far()};
 }
+
+std::string Process::err_so_far() const { return read_file(folder_ / "err").value_or(""); }
 
 void Process::take_status(int status) {
   ended_ = true;

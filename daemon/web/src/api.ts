@@ -47,6 +47,7 @@ export interface Case {
   state: CaseState;
   priority: number;
   hold?: string;
+  damage?: string[];
   verified?: string;
   removed?: string;
   seconds_left?: number;

@@ -40,6 +40,14 @@ function modeLabel(name: string): string {
 
 export function facesPart(face: Job, skull: Job | undefined, files: ArtifactFile[], anatomicalFromInput: number[][] | undefined): { element: HTMLElement; end(): void } {
   const list = choices(face, skull, files, anatomicalFromInput);
+  const loaded = new Map<string, Promise<Shape>>();
+  const shapeOf = (choice: Choice) => {
+    if (!loaded.has(choice.id)) loaded.set(choice.id, choice.load());
+    return loaded.get(choice.id) as Promise<Shape>;
+  };
+  const atFirst = ["fitted", "face"];
+  // They come while the browser gets ready to draw. Who shows them tells what went wrong.
+  for (const choice of list.filter(({ id }) => atFirst.includes(id))) shapeOf(choice).catch(() => {});
   const canvas = h("canvas", { class: "scene", tabindex: 0, role: "img", "aria-label": t("result.canvas") });
   const status = h("p", { role: "status", class: "soft" }, t("result.loading"));
   let viewer: Viewer;
@@ -48,12 +56,7 @@ export function facesPart(face: Job, skull: Job | undefined, files: ArtifactFile
   } catch {
     return { element: h("section", { class: "card" }, h("p", { class: "note" }, t("result.no_3d"))), end: () => {} };
   }
-  const loaded = new Map<string, Promise<Shape>>();
-  const shapeOf = (choice: Choice) => {
-    if (!loaded.has(choice.id)) loaded.set(choice.id, choice.load());
-    return loaded.get(choice.id) as Promise<Shape>;
-  };
-  const sides = ["fitted", "face"].map((id, side) => {
+  const sides = atFirst.map((id, side) => {
     const choose = h(
       "select",
       { onchange: () => void put(side) },
@@ -62,18 +65,25 @@ export function facesPart(face: Job, skull: Job | undefined, files: ArtifactFile
     );
     return choose;
   });
+  const shows = ["", ""];
   const legend = h("p", { class: "soft", hidden: true }, t("result.legend"));
   async function put(side: number): Promise<void> {
     const choice = list.find((c) => c.id === sides[side].value);
     legend.hidden = !sides.some((s) => s.value === "uncertainty");
     viewer.clearMarks();
     first = null;
+    const shown = (id: string) => {
+      shows[side] = id;
+      canvas.dataset.shows = shows.join(" ").trim();
+    };
+    shown("");
     if (choice === undefined) return viewer.show(side, null, 0);
     setText(status, t("result.loading"));
     try {
       const shape = await shapeOf(choice);
       if (sides[side].value !== choice.id) return;
       viewer.show(side, shape, choice.colour);
+      shown(choice.id);
       if (choice.id === "face") showModes(shape);
       setText(status, "");
     } catch (error) {
@@ -100,10 +110,7 @@ export function facesPart(face: Job, skull: Job | undefined, files: ArtifactFile
       });
       return { input, value, label: modeLabel(mode.name) };
     });
-    const change = () => {
-      morph(shape, mean, inputs.map(({ input }) => Number(input.value)));
-      viewer.draw();
-    };
+    const change = () => viewer.draw(() => morph(shape, mean, inputs.map(({ input }) => Number(input.value))));
     const reset = () => {
       for (const { input, value } of inputs) {
         input.value = "0";

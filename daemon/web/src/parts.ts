@@ -1,7 +1,7 @@
 // Small things that several pages show.
 import { Refusal, type Case } from "./api";
 import { fill, h } from "./dom";
-import { t, word } from "./text";
+import { currentLanguage, says, t, word } from "./text";
 import de from "./messages/de.json";
 
 /** What went wrong, in words of this language where there are some. */
@@ -21,6 +21,12 @@ export function notice(): { place: HTMLElement; bad(error: unknown): void; good(
     good: (text) => fill(place, h("p", { class: "note good" }, text)),
     clear: () => fill(place),
   };
+}
+
+/** A sentence of the station's; marked as English where it is not known in this language. */
+export function stationSays(text: string): HTMLElement {
+  const here = says(text);
+  return h("span", { lang: currentLanguage() !== "en" && here === text ? "en" : null }, here);
 }
 
 export function tag(group: string, state: string): HTMLElement {

@@ -1,6 +1,7 @@
 // Every word of the console, from the message files. No sentence is put together from parts.
 import de from "./messages/de.json";
 import en from "./messages/en.json";
+import stationDe from "./messages/station_de.json";
 
 export type Language = "en" | "de";
 export type Key = keyof typeof en;
@@ -33,6 +34,23 @@ export function t(key: Key, values: Record<string, string | number> = {}): strin
 export function word(group: string, name: string): string {
   const key = `${group}.${name}`;
   return key in catalogues[language] ? catalogues[language][key as Key] : name;
+}
+
+/** What the station itself says, as patterns: its sentences have names, numbers and one another in them. */
+const sentences = Object.entries(stationDe).map(([english, german]) => ({
+  pattern: new RegExp(`^${english.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{(\w+)\}/g, "(?<$1>.+)")}$`, "s"),
+  german,
+}));
+
+/** A sentence of the station's in this language; English where it is not known. */
+export function says(text: string): string {
+  if (language === "en") return text;
+  for (const { pattern, german } of sentences) {
+    const groups = pattern.exec(text)?.groups;
+    if (groups !== undefined) return german.replace(/\{(\w+)\}/g, (_, name) => says(groups[name]));
+    if (pattern.test(text)) return german;
+  }
+  return text;
 }
 
 export function number(value: number, digits = 0): string {

@@ -1,6 +1,7 @@
 // Skull and face in 3D. Everything is shown in glTF's axes (x right, y up, the face along z), in mm.
 import {
   AmbientLight,
+  type Box3,
   BufferAttribute,
   BufferGeometry,
   Color,
@@ -51,8 +52,13 @@ export async function plyShape(address: string, placed = new Matrix4()): Promise
   return { geometry, modes: [], coloured: geometry.getAttribute("color") !== undefined };
 }
 
-/** A GLB of ours, with its morph targets as modes. */
-export async function glbShape(address: string, placed = new Matrix4()): Promise<Shape> {
+function scale(values: Float32Array, factor: number): Float32Array {
+  for (let i = 0; i < values.length; ++i) values[i] *= factor;
+  return values;
+}
+
+/** A GLB of ours, with its morph targets as modes; `placed` takes it to the anatomical frame. */
+export async function glbShape(address: string, placed?: Matrix4): Promise<Shape> {
   const gltf = await new GLTFLoader().parseAsync(await fetched(address), "");
   let found: Mesh | null = null;
   gltf.scene.traverse((node) => {
@@ -64,12 +70,13 @@ export async function glbShape(address: string, placed = new Matrix4()): Promise
   const names = Object.entries(mesh.morphTargetDictionary ?? {}).sort((a, b) => a[1] - b[1]);
   const modes = targets.map((target, i) => ({
     name: names[i]?.[0] ?? String(i + 1),
-    offsets: Float32Array.from(target.array, (metres) => 1000 * metres),
+    offsets: scale(target.array as Float32Array, 1000),  // m to mm
   }));
   const geometry = mesh.geometry;
   geometry.morphAttributes = {};
-  geometry.scale(1000, 1000, 1000);
-  geometry.applyMatrix4(gltfFromOurs.clone().multiply(placed).multiply(gltfFromOurs.clone().invert()));
+  scale(geometry.getAttribute("position").array as Float32Array, 1000);
+  geometry.boundingBox = geometry.boundingSphere = null;
+  if (placed) geometry.applyMatrix4(gltfFromOurs.clone().multiply(placed).multiply(gltfFromOurs.clone().invert()));
   if (!geometry.getAttribute("normal")) geometry.computeVertexNormals();
   return { geometry, modes, coloured: geometry.getAttribute("color") !== undefined };
 }
@@ -102,6 +109,45 @@ function shade(geometry: BufferGeometry): void {
   normal.needsUpdate = true;
 }
 
+/** Does the processor draw? Then every triangle and every sample of a pixel is dear. Takes the canvas's context. */
+function drawnInSoftware(canvas: HTMLCanvasElement): boolean {
+  const gl = canvas.getContext("webgl2");
+  const about = gl?.getExtension("WEBGL_debug_renderer_info");
+  if (!gl || !about) return false;
+  const name = String(gl.getParameter(about.UNMASKED_RENDERER_WEBGL));
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|basic render/i.test(name);
+}
+
+const cellsAcross = 90;
+
+/** The triangles that are left if all vertices in a cell of a grid were one: what is drawn while
+    something moves. Nothing if there are few triangles anyway. */
+function coarseIndex(geometry: BufferGeometry): BufferAttribute | null {
+  const index = geometry.getIndex()?.array;
+  if (index === undefined || index.length < 3 * 30000) return null;
+  const p = geometry.getAttribute("position").array;
+  geometry.computeBoundingBox();
+  const { min, max } = geometry.boundingBox as Box3;
+  const cell = Math.max(max.x - min.x, max.y - min.y, max.z - min.z) / (cellsAcross - 1);
+  const first = new Int32Array(cellsAcross ** 3).fill(-1);
+  const stands = new Uint32Array(p.length / 3);
+  for (let v = 0; v < stands.length; ++v) {
+    const x = Math.floor((p[3 * v] - min.x) / cell), y = Math.floor((p[3 * v + 1] - min.y) / cell), z = Math.floor((p[3 * v + 2] - min.z) / cell);
+    const at = (x * cellsAcross + y) * cellsAcross + z;
+    if (first[at] < 0) first[at] = v;
+    stands[v] = first[at];
+  }
+  const kept = new Uint32Array(index.length);
+  let count = 0;
+  for (let i = 0; i < index.length; i += 3) {
+    const a = stands[index[i]], b = stands[index[i + 1]], c = stands[index[i + 2]];
+    if (a === b || b === c || c === a) continue;
+    kept[count++] = a, kept[count++] = b, kept[count++] = c;
+  }
+  return new BufferAttribute(kept.slice(0, count), 1);
+}
+
 /** The shape with other values of its modes, in standard deviations. */
 export function morph(shape: Shape, mean: Float32Array, values: number[]): void {
   const position = shape.geometry.getAttribute("position") as BufferAttribute;
@@ -127,13 +173,19 @@ export class Viewer {
   );
   private readonly marks = new Group();
   private readonly resized: ResizeObserver;
+  private readonly coarse = new Map<BufferGeometry, { fine: BufferAttribute; coarse: BufferAttribute }>();
+  private readonly software: boolean;
   private asked = false;
+  private before = () => {};
+  private refining = 0;
   private sideBySide = true;
 
   /** Throws where there is no WebGL. */
   constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.software = drawnInSoftware(document.createElement("canvas"));
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, alpha: true });
+    this.renderer.debug.checkShaderErrors = false;  // it would wait for them
+    this.renderer.setPixelRatio(this.software ? 1 : Math.min(2, window.devicePixelRatio));
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enablePan = false;
     this.controls.addEventListener("change", () => this.draw());
@@ -151,6 +203,7 @@ export class Viewer {
   show(side: number, shape: Shape | null, colour: number): void {
     this.sides[side].clear();
     if (shape !== null) {
+      this.coarsen(shape.geometry);
       const material = this.materials[side];
       material.vertexColors = shape.coloured;
       material.color = new Color(shape.coloured ? 0xffffff : colour);
@@ -179,7 +232,7 @@ export class Viewer {
 
   look(from: "front" | "side" | "three" | "back"): void {
     const turn = { front: 0, side: Math.PI / 2, three: Math.PI / 5, back: Math.PI }[from];
-    const distance = this.sideBySide ? 1400 : 1150;
+    const distance = this.sideBySide ? 1200 : 1000;
     this.controls.target.set(0, 0, 0);
     this.camera.position.set(distance * Math.sin(turn), 0, distance * Math.cos(turn));
     this.controls.update();
@@ -188,6 +241,7 @@ export class Viewer {
 
   /** Where a point of the canvas (-1 to 1) meets a surface, without the side's shift. */
   pick(x: number, y: number): Vector3 | null {
+    this.scene.updateMatrixWorld();  // it may have been turned since it was drawn
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(x, y), this.camera);
     const hit = ray.intersectObjects(this.sides, true)[0];
@@ -204,20 +258,41 @@ export class Viewer {
     this.draw();
   }
 
-  draw(): void {
+  /** With the next frame; before it, once, what the last caller wants to be done first. */
+  draw(before?: () => void): void {
+    if (before) this.before = before;
     if (this.asked) return;
     this.asked = true;
     requestAnimationFrame(() => {
       this.asked = false;
-      this.renderer.render(this.scene, this.camera);
-      this.canvas.dispatchEvent(new Event("drawn"));
+      this.before();
+      this.before = () => {};
+      this.render(this.coarse.size > 0 ? "coarse" : "fine");
+      if (this.coarse.size === 0) return;
+      clearTimeout(this.refining);
+      this.refining = window.setTimeout(() => this.asked || this.render("fine"), 250);
     });
   }
 
   end(): void {
+    clearTimeout(this.refining);
     this.resized.disconnect();
     this.controls.dispose();
     this.renderer.dispose();
+  }
+
+  private render(detail: "coarse" | "fine"): void {
+    for (const [geometry, indices] of this.coarse) geometry.setIndex(indices[detail]);
+    this.renderer.render(this.scene, this.camera);
+    for (const [geometry, indices] of this.coarse) geometry.setIndex(indices.fine);
+    this.canvas.dataset.detail = detail;
+    this.canvas.dispatchEvent(new Event("drawn"));
+  }
+
+  private coarsen(geometry: BufferGeometry): void {
+    if (!this.software || this.coarse.has(geometry)) return;
+    const coarse = coarseIndex(geometry);
+    if (coarse !== null) this.coarse.set(geometry, { fine: geometry.getIndex() as BufferAttribute, coarse });
   }
 
   private resize(): void {

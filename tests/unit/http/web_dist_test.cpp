@@ -62,5 +62,34 @@ TEST(WebMessages, AreTheSameInBothLanguages) {
   }
 }
 
+/// The sources of what speaks to the person at the table, their string literals joined.
+std::string program_text() {
+  std::string all;
+  for (const char* folder :
+       {"capture", "daemon/jobs", "daemon/service", "daemon/station", "firmware_io"}) {
+    for (const auto& entry :
+         fs::recursive_directory_iterator(fs::path(SKULLSTATION_SOURCE_DIR) / folder)) {
+      if (entry.path().extension() == ".cpp") all += *read_file(entry.path());
+    }
+  }
+  static const std::regex seam("\"\\s*\n\\s*\"");
+  static const std::regex quote(R"(\\")");
+  return std::regex_replace(std::regex_replace(all, seam, ""), quote, "\"");
+}
+
+TEST(WebMessages, KnowWhatTheStationSaysInEnglish) {
+  const std::string program = program_text();
+  const json german = json::parse(*read_file(web / "src/messages/station_de.json"));
+  static const std::regex seam(R"(\{\w+\}|[:;)] )");
+  for (const auto& [english, translated] : german.items()) {
+    EXPECT_EQ(holes_of(english), holes_of(translated)) << english;
+    std::sregex_token_iterator piece(english.begin(), english.end(), seam, -1);
+    for (; piece != std::sregex_token_iterator(); ++piece) {
+      EXPECT_NE(program.find(*piece), std::string::npos)
+          << "nothing says \"" << *piece << "\" of \"" << english << "\"";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace skullstation

@@ -284,6 +284,21 @@ TEST_F(CaseStoreTest, DamageIsFound) {
   EXPECT_THAT(store_->damage(false), ElementsAre(HasSubstr("is missing: images/0.png")));
 }
 
+TEST_F(CaseStoreTest, WhatIsWrongWithACasesFilesIsNotedOnce) {
+  const auto a = *scan_fake_case(*store_, "a", {});
+  const auto b = *scan_fake_case(*store_, "b", {});
+  const auto blob = store_->blob(store_->files(store_->jobs(a.id)->front().id)->at(1));
+  const auto events = store_->events(a.id)->size();
+  EXPECT_THAT(*store_->check_case(a.id, {}), IsEmpty());
+  fs::remove(blob);
+  std::ofstream(blob) << "<a-7>";  // of the same size
+  EXPECT_THAT(*store_->check_case(a.id, {}), ElementsAre(HasSubstr("is damaged: images/1.png")));
+  EXPECT_THAT(*store_->check_case(a.id, {}), ElementsAre(HasSubstr("is damaged: images/1.png")));
+  EXPECT_THAT(*store_->check_case(b.id, {}), IsEmpty());
+  ASSERT_EQ(store_->events(a.id)->size(), events + 1);
+  EXPECT_THAT(store_->events(a.id)->back().what, HasSubstr("is damaged: images/1.png"));
+}
+
 TEST_F(CaseStoreTest, WhatDoesNotExistIsNamed) {
   EXPECT_THAT(store_->case_of(7).error().message(), HasSubstr("case 7: there is no such case"));
   EXPECT_THAT(store_->retry(7).error().message(), HasSubstr("job 7: there is no such job"));

@@ -3,7 +3,7 @@ import { fileAddress, get, send, type ArtifactFile, type Job, type SignIn, type 
 import { fill, h } from "../dom";
 import { facesPart } from "../faces";
 import { live } from "../live";
-import { field, form, notice, tag } from "../parts";
+import { field, form, notice, stationSays, tag } from "../parts";
 import { deliveryPart, onTheirWay } from "./delivery";
 import { bytes, duration, moment, number, t, word } from "../text";
 
@@ -36,7 +36,7 @@ function stepsPart(whole: WholeCase, who: SignIn, again: () => void): HTMLElemen
       running && h("progress", { max: 1, value: running.fraction, "aria-label": word("step", job.step) }),
       job.state === "done" && job.seconds > 0 && h("span", { class: "soft" }, t("job.took", { time: duration(job.seconds) })),
       tag("job", job.state),
-      job.error && h("p", { class: "note bad" }, job.error),
+      job.error && h("p", { class: "note bad" }, stationSays(job.error)),
       job.state === "failed" && job.log && h("details", {}, h("summary", {}, t("job.log")), h("pre", { tabindex: 0 }, job.log)),
       mayRetry && job.step !== "scan" && ["failed", "cancelled"].includes(job.state) && h("button", { onclick: () => act(`/jobs/${job.id}/retry`) }, t("job.retry")),
       mayCancel && job.step !== "scan" && ["waiting", "running"].includes(job.state) && h("button", { onclick: () => act(`/jobs/${job.id}/cancel`) }, t("job.cancel")),
@@ -104,9 +104,10 @@ function landmarksPart(figures: CaseFigures): HTMLElement {
 export function casePage(place: HTMLElement, who: SignIn, argument: string): () => void {
   const said = notice();
   const head = h("div", { class: "row" });
+  const damage = h("div");
   const result = h("div");
   const below = h("div", { class: "columns" });
-  fill(place, head, said.place, result, below);
+  fill(place, head, said.place, damage, result, below);
   let shownFace = 0;
   let endFaces = () => {};
   let ended = false;
@@ -114,8 +115,10 @@ export function casePage(place: HTMLElement, who: SignIn, argument: string): () 
   let moving = false;
 
   async function showFaces(face: Job, skull: Job | undefined): Promise<HTMLElement[]> {
-    const { files } = await get<{ files: ArtifactFile[] }>(`/jobs/${face.id}/files`);
-    const figures: CaseFigures = await (await fetch(fileAddress(face.id, "case.json"))).json().catch(() => ({}));
+    const [{ files }, figures] = await Promise.all([
+      get<{ files: ArtifactFile[] }>(`/jobs/${face.id}/files`),
+      fetch(fileAddress(face.id, "case.json")).then<CaseFigures>((answer) => answer.json()).catch((): CaseFigures => ({})),
+    ]);
     if (ended) return [];
     const faces = facesPart(face, skull, files, figures.anatomical_from_input);
     endFaces = faces.end;
@@ -140,13 +143,14 @@ export function casePage(place: HTMLElement, who: SignIn, argument: string): () 
     const face = jobs.find((job) => job.step === "approximate");
     const skull = jobs.find((job) => job.step === "reconstruct" && job.state === "done");
     fill(head, h("h1", {}, whole.number), tag("case.state", whole.state), h("span", { class: "soft" }, moment(whole.created)));
+    fill(damage, (whole.damage ?? []).length > 0 && h("div", { class: "note bad", role: "alert" }, h("p", {}, t("result.damaged")), h("ul", {}, whole.damage?.map((d) => h("li", {}, stationSays(d))))));
     if (face?.state === "done" && !whole.removed && shownFace !== face.id) {
       shownFace = face.id;
       endFaces();
       extras = await showFaces(face, skull);
     }
     const again = () => void look().catch(said.bad);
-    const history = h("details", { class: "card" }, h("summary", {}, t("result.history")), h("ul", { class: "plain" }, whole.events.map((e) => h("li", {}, h("span", { class: "soft" }, moment(e.time)), h("span", { lang: "en" }, e.what)))));
+    const history = h("details", { class: "card" }, h("summary", {}, t("result.history")), h("ul", { class: "plain" }, whole.events.map((e) => h("li", {}, h("span", { class: "soft" }, moment(e.time)), stationSays(e.what)))));
     const mayRerun = who.role === "examiner" && skull !== undefined && !whole.removed;
     fill(below, h("div", {}, signOffPart(whole, face, who, again), extras), h("div", {}, stepsPart(whole, who, again), mayRerun && rerunPart(whole, again), history));
   }

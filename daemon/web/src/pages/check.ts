@@ -1,7 +1,7 @@
 import { get, type Finding } from "../api";
 import { fill, h } from "../dom";
 import { live } from "../live";
-import { notice, tag } from "../parts";
+import { notice, stationSays, tag } from "../parts";
 import { bytes, t } from "../text";
 
 interface Check {
@@ -23,7 +23,7 @@ export function checkPage(place: HTMLElement): () => void {
       said.clear();
       fill(
         rows,
-        check.findings.map((f) => h("tr", {}, h("td", {}, tag("check", f.verdict)), h("td", { lang: "en" }, f.topic), h("td", { lang: "en" }, f.what, f.advice && h("div", { class: "soft" }, f.advice)))),
+        check.findings.map((f) => h("tr", {}, h("td", {}, tag("check", f.verdict)), h("td", {}, stationSays(f.topic)), h("td", {}, stationSays(f.what), f.advice && h("div", { class: "soft" }, stationSays(f.advice))))),
       );
       const fact = (name: string, value: string) => [h("dt", {}, h("strong", {}, name)), h("dd", {}, value)];
       fill(

@@ -1,7 +1,7 @@
 // Where the packages of a case are on their way, and what a person may do about it.
 import { send, type Delivery, type SignIn, type WholeCase } from "../api";
 import { h } from "../dom";
-import { notice, tag } from "../parts";
+import { notice, stationSays, tag } from "../parts";
 import { moment, t } from "../text";
 
 /** Will it go on by itself? Then the page looks again. */
@@ -31,7 +31,7 @@ export function deliveryPart(whole: WholeCase, who: SignIn, again: () => void): 
       d.delivered && h("span", { class: "soft" }, t("delivery.delivered_on", { time: moment(d.delivered) })),
       d.state !== "delivered" && d.attempts > 0 && h("span", { class: "soft" }, t("delivery.attempts", { count: d.attempts })),
       d.next_attempt && h("span", { class: "soft" }, t("delivery.next", { time: moment(d.next_attempt) })),
-      d.state !== "delivered" && d.last_error && h("p", { class: d.state === "rejected" ? "note bad" : "note", lang: "en" }, d.last_error),
+      d.state !== "delivered" && d.last_error && h("p", { class: d.state === "rejected" ? "note bad" : "note" }, stationSays(d.last_error)),
       mayRetry && ["waiting", "rejected", "held"].includes(d.state) && h("button", { "aria-label": t("delivery.retry_to", { target: d.target }), onclick: () => act(d.id, "retry") }, t("delivery.retry")),
       mayHold && ["queued", "waiting", "rejected"].includes(d.state) && h("button", { "aria-label": t("delivery.hold_to", { target: d.target }), onclick: () => act(d.id, "hold") }, t("delivery.hold")),
     );

@@ -3,22 +3,21 @@ import { ask, get, send, type Case, type ScanView, type SignIn, type Station } f
 import { coverageDome } from "../dome";
 import { fill, h, setText } from "../dom";
 import { live } from "../live";
-import { caseLink, field, notice, sure, tag, words } from "../parts";
-import { duration, moment, number, t, word, type Key } from "../text";
+import { caseLink, field, notice, stationSays, sure, tag, words } from "../parts";
+import { duration, moment, number, says, t, word, type Key } from "../text";
 
 const idle = ["ready", "building", "result"];
 
 /** What the person has to do, in this language where the station's own words are known. */
 function instruction(station: Station): string {
-  const says = station.message;
+  const message = station.message;
   if (station.state === "turn-over") {
-    if (says.startsWith("The scan goes on")) return t("says.continued");
-    if (says.includes("upside down")) return t("says.over");
-    if (says.includes("on its back")) return t("says.back");
-    if (says.includes("upright")) return t("says.upright");
-    return says;
+    if (message.startsWith("The scan goes on")) return t("says.continued");
+    if (message.includes("upside down")) return t("says.over");
+    if (message.includes("on its back")) return t("says.back");
+    if (message.includes("upright")) return t("says.upright");
+    return says(message);
   }
-  if (station.state === "fault") return `${says} ${t("do.fault")}`;
   return t(`do.${idle.includes(station.state) ? "ready" : station.state}` as Key);
 }
 
@@ -26,12 +25,12 @@ function instruction(station: Station): string {
 function remark(station: Station): string {
   const known = ["Lay the next specimen", "is being photographed", "is saved"];
   if (!idle.includes(station.state) || known.some((part) => station.message.includes(part))) return "";
-  return station.message;
+  return says(station.message);
 }
 
 function stateBox(station: Station): HTMLElement {
   const kind = { fault: "bad", stopped: "bad", scanning: "busy", starting: "busy", "turn-over": "busy" }[station.state as string] ?? "good";
-  return h("div", { class: `state ${kind}`, role: "status" }, h("h1", {}, word("state", station.state)), h("p", {}, instruction(station)));
+  return h("div", { class: `state ${kind}`, role: "status" }, h("h1", {}, word("state", station.state)), h("div", {}, station.state === "fault" && h("p", {}, stationSays(station.message)), h("p", {}, instruction(station))));
 }
 
 interface Part {
@@ -43,7 +42,9 @@ interface Part {
 
 function previewPart(station: Station): Part {
   const image = h("img", { class: "preview", alt: t("table.preview_none") });
-  const figures = h("div", { class: "figures" });
+  const figures = h("div");
+  // Where focus is best is seen by turning the lens: the ring is right where the bar was longest.
+  const sharpest = new Map<string, number>();
   const verdict = h("div", { "aria-live": "polite" });
   let camera = station.cameras[0]?.id ?? "";
   let address = "";
@@ -62,13 +63,17 @@ function previewPart(station: Station): Part {
     if (address) URL.revokeObjectURL(address);
     image.src = address = picture;
     image.alt = t("table.preview_alt", { camera: asked });
+    const best = Math.max(about.sharpness, sharpest.get(asked) ?? 0);
+    sharpest.set(asked, best);
+    const [darkest, brightest] = about.mean_level_allowed;
+    const light = about.mean_level < darkest ? "table.too_dark" : about.mean_level > brightest ? "table.too_bright" : "table.light_good";
+    const bar = (label: string, bounds: object) => h("label", {}, label, h("meter", bounds as Record<string, unknown>));
     fill(
       figures,
-      h("span", {}, t("table.sharp", { value: number(about.sharpness, 2) })),
-      h("span", {}, t("table.light", { value: number(about.mean_level) })),
-      h("span", {}, t("table.clipped", { value: number(about.clipped_percent, 1) })),
+      bar(t("table.sharp", { percent: number(best > 0 ? (100 * about.sharpness) / best : 0), value: number(about.sharpness, 2) }), { min: 0, max: 1, low: 0.8, optimum: 1, value: best > 0 ? about.sharpness / best : 0 }),
+      bar(`${t("table.light", { value: number(about.mean_level) })} ${t(light)} ${t("table.clipped", { value: number(about.clipped_percent, 1) })}`, { min: 0, max: 255, low: darkest, high: brightest, optimum: (darkest + brightest) / 2, value: about.mean_level }),
     );
-    const text = about.complaint ? `${t("table.bad")} ${about.complaint}` : t("table.good");
+    const text = about.complaint ? `${t("table.bad")} ${says(about.complaint)}` : t("table.good");
     if (verdict.textContent !== text) fill(verdict, h("p", { class: about.complaint ? "note" : "note good" }, text));
   }
   async function keepLooking(): Promise<void> {
@@ -79,7 +84,8 @@ function previewPart(station: Station): Part {
     }
   }
   void keepLooking();
-  const element = h("section", { class: "card" }, station.cameras.length > 1 && field(t("table.preview"), choose), image, figures, verdict);
+  const help = h("details", {}, h("summary", {}, t("table.focus_help")), h("p", {}, t("table.focus_how")), h("p", {}, t("table.light_how")));
+  const element = h("section", { class: "card" }, station.cameras.length > 1 && field(t("table.preview"), choose), image, verdict, figures, help);
   return { element, update: () => {}, end: () => ((ended = true), address && URL.revokeObjectURL(address)) };
 }
 
@@ -127,7 +133,7 @@ function scanPart(station: Station): Part {
       views = (await get<{ views: ScanView[] }>("/station/scan").catch(() => ({ views }))).views;
       const pass = views.length > 0 ? views[views.length - 1].pass : 0;
       fill(dome, coverageDome(station, views, pass));
-      const rejected = [...new Set(views.filter((v) => v.rejected).map((v) => `${v.camera}: ${v.rejected}`))];
+      const rejected = [...new Set(views.filter((v) => v.rejected).map((v) => `${v.camera}: ${says(v.rejected ?? "")}`))];
       fill(bad, rejected.length > 0 && h("div", { class: "note" }, t("table.rejected"), h("ul", {}, rejected.slice(-4).map((r) => h("li", {}, r)))));
     }
     setText(count, `${t("table.progress", { percent: number(100 * fraction) })} · ${t("table.views", { done: views.length, all })}`);
@@ -154,7 +160,7 @@ function casesPart(): Part {
     void look(station).catch(() => {});
     bar.hidden = station.job === undefined;
     bar.value = station.job?.fraction ?? 0;
-    setText(step, station.trouble ?? (station.job ? `${word("step", station.job.step)} · ${number(100 * station.job.fraction)} %` : ""));
+    setText(step, station.trouble !== undefined ? says(station.trouble) : (station.job ? `${word("step", station.job.step)} · ${number(100 * station.job.fraction)} %` : ""));
   };
   return { element: h("section", { class: "card" }, h("h2", {}, t("table.latest")), bar, step, list), update, end: () => {} };
 }
@@ -202,7 +208,7 @@ export function tablePage(place: HTMLElement, who: SignIn): () => void {
     for (const part of parts) part.update(station);
     if (live.log.length !== logged) {
       logged = live.log.length;
-      fill(log, [...live.log].reverse().map((line) => h("p", {}, h("span", { class: "soft" }, `${moment(line.time)} `), line.words)));
+      fill(log, [...live.log].reverse().map((line) => h("p", {}, h("span", { class: "soft" }, `${moment(line.time)} `), stationSays(line.words))));
     }
   }
   const end = live.listen(update);
