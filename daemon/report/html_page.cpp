@@ -17,9 +17,9 @@ constexpr std::string_view style =
     "body{font:15px/1.5 system-ui,sans-serif;color:#222;max-width:1200px;margin:2em auto;"
     "padding:0 1.5em}h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em}"
     "table{border-collapse:collapse}td{padding:.25em 1.5em .25em 0;border-bottom:1px solid #ddd;"
-    "vertical-align:top}td:first-child{color:#555}"
+    "vertical-align:top;overflow-wrap:anywhere}td:first-child{color:#555}svg{max-width:100%}"
     ".warning{background:#fff4d6;border-left:5px solid #e0a000;padding:.5em 1em;margin:.5em 0}"
-    ".pictures{display:flex;flex-wrap:wrap;gap:12px}figure{margin:0;flex:1 1 280px;max-width:380px;"
+    ".pictures{display:flex;flex-wrap:wrap;gap:12px}figure{margin:0;flex:1 1 240px;max-width:380px;"
     "break-inside:avoid}img{width:100%;display:block}figcaption{font-size:.85em;color:#555}";
 
 std::string escaped(std::string_view text) {
