@@ -66,6 +66,8 @@ void add_evidence_commands(CLI::App& app, Command& chosen) {
         package.add_option("--config", o.config, "station.toml: its keys and its audit log");
         package.add_option("--keys", o.keys, "folder of keys (default: the configuration's)");
         package.add_option("--audit-log", o.audit_log, "file (default: the configuration's)");
+        package.add_option("--time-stamp", o.time_stamp_url,
+                           "address of an RFC 3161 authority (default: the configuration's)");
         package.add_option("--by", o.by, "who seals it (default: this user)");
       });
   add<ExhibitCommand>(

@@ -110,7 +110,7 @@ Result<void> run(const Options& options) {
     fs::remove_all(options.folder / "plain");
     plain_peak = std::max(plain_peak, r == 0 ? peak_memory_gib() : 0.0);
     start = Seconds::now();
-    const auto sealed = write_package(what, *keys, std::nullopt, "bench", SystemClock(),
+    const auto sealed = write_package(what, {*keys, std::nullopt, "bench", {}}, SystemClock(),
                                       options.folder / "bag", options.threads);
     if (!sealed) return forward(sealed);
     better(seal, Seconds::now() - start);

@@ -202,6 +202,7 @@ struct PackageCommand {
   std::filesystem::path config;     ///< empty: no audit log, keys from `keys`
   std::filesystem::path keys;       ///< folder; empty: as the configuration says
   std::filesystem::path audit_log;  ///< file; empty: as the configuration says
+  std::string time_stamp_url;       ///< of an authority; empty: as the configuration says
   std::string by;                   ///< who seals it; empty: this program's user
 };
 Result<CommandReport> run(const PackageCommand&, const CommonOptions&, const Progress&);

@@ -6,6 +6,7 @@
 
 #include "core/clock.h"
 #include "daemon/cli/commands.h"
+#include "daemon/delivery/time_stamp_client.h"
 #include "daemon/evidence/package.h"
 #include "daemon/evidence/package_check.h"
 #include "daemon/station/station_config.h"
@@ -52,6 +53,13 @@ std::string signatures_in_words(const PackageCheck& check) {
                                          check.cms_signer->name, check.cms_signer->signing_time,
                                          check.cms_signer->fingerprint)
                            : "  CMS        NOT VALID\n";
+  if (check.time_stamp) {
+    text += fmt::format("  time stamp {} by the clock of {}{}\n", check.time_stamp->time,
+                        check.time_stamp->authority,
+                        !check.time_stamp_trusted   ? " (trust not asked)"
+                        : *check.time_stamp_trusted ? ", whom you trust"
+                                                    : ", who is NOT among those you trust");
+  }
   if (check.audit_entry) {
     text +=
         fmt::format("  audit log  entry {} of station {}, {}, by {}\n", check.audit_entry->number,
@@ -84,6 +92,13 @@ Json json_of(const PackageCheck& check) {
       {"signatures",
        {{"ed25519", {{"valid", check.ed25519_valid}, {"key_sha256", check.ed25519_fingerprint}}},
         {"cms", cms}}}};
+  if (check.time_stamp) {
+    json["time_stamp"] = {
+        {"time", check.time_stamp->time},
+        {"authority", check.time_stamp->authority},
+        {"serial", check.time_stamp->serial},
+        {"trusted", check.time_stamp_trusted ? Json(*check.time_stamp_trusted) : Json(nullptr)}};
+  }
   json["trusted"] = check.trusted ? Json(*check.trusted) : Json(nullptr);
   if (check.audit_entry) {
     json["audit_entry"] = {{"number", check.audit_entry->number},
@@ -120,15 +135,20 @@ Result<CommandReport> run(const PackageCommand& command, const CommonOptions& co
   std::optional<AuditLogPlace> audit_log;
   if (!log.empty()) audit_log = {log, source.station};
 
+  const std::string authority =
+      command.time_stamp_url.empty() ? config->evidence.time_stamp_url : command.time_stamp_url;
+  const Seal seal{*keys, audit_log, command.by.empty() ? user_name() : command.by,
+                  authority.empty() ? TimeStamper() : time_stamper_at(authority)};
   const auto sealed =
-      write_package(source, *keys, audit_log, command.by.empty() ? user_name() : command.by,
-                    SystemClock(), command.out, common.threads, progress);
+      write_package(source, seal, SystemClock(), command.out, common.threads, progress);
   if (!sealed) return forward(sealed);
   CommandReport report;
   report.text = fmt::format(
       "{}\n  case {}: {} files, {:.1f} MB, signed{}\n  SHA-256 of tagmanifest-sha256.txt: {}\n",
       command.out.string(), sealed->case_number, sealed->files,
-      static_cast<double>(sealed->bytes) / 1e6, audit_log ? ", in the audit log" : "",
+      static_cast<double>(sealed->bytes) / 1e6,
+      (authority.empty() ? std::string() : ", time stamped") +
+          (audit_log ? ", in the audit log" : ""),
       sealed->tag_manifest_sha256);
   Json json = {{"package", command.out.string()},
                {"case", sealed->case_number},

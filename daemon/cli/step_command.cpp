@@ -83,6 +83,7 @@ PackageCommand seal_from(Request& request) {
   command.out = request.out;
   command.keys = request.station.text("keys_folder");
   command.audit_log = request.station.text("audit_log");
+  command.time_stamp_url = request.station.text("time_stamp_url");
   command.by = request.options.optional_text("approved_by").value_or("skullstationd");
   return command;
 }

@@ -108,11 +108,13 @@ class TagFiles {
 
 /// Everything that the tag manifest lists; returns that manifest.
 Result<std::string> write_tags(const PackageContent& content, const SealedFiles& sealed,
-                               const StationKeys& keys, bool audited, const StagedFolder& staged) {
+                               const Seal& seal, const StagedFolder& staged) {
   std::vector<ManifestLine> payload;
   for (const auto& [path, digest] : sealed) payload.push_back({path, digest.sha256});
   std::vector<std::string> seals = {ed25519_file, cms_file};
-  if (audited) seals.emplace_back(audit_entry_file);
+  if (seal.time_stamper) seals.emplace_back(time_stamp_file);
+  if (seal.audit_log) seals.emplace_back(audit_entry_file);
+  const StationKeys& keys = seal.keys;
   const auto owner = certificate_owner(keys.certificate_pem);
   TagFiles tags(staged);
   for (const auto& written :
@@ -134,6 +136,18 @@ Result<std::string> write_tags(const PackageContent& content, const SealedFiles&
   return manifest;
 }
 
+/// The authority's answer about the signature.
+Result<std::string> stamped(const TimeStamper& time_stamper, const std::string& signature) {
+  const std::string query = time_stamp_query(signature);
+  auto answer = time_stamper(query);
+  if (!answer) {
+    answer.error().where = "time stamp of " + answer.error().where;
+    return answer;
+  }
+  if (const auto stamp = read_time_stamp(*answer, signature, query); !stamp) return forward(stamp);
+  return answer;
+}
+
 AuditEvent audit_event(const PackageSummary& summary, const std::string& who) {
   return {who, "package", summary.case_number,
           nlohmann::ordered_json{{"files", summary.files},
@@ -144,10 +158,9 @@ AuditEvent audit_event(const PackageSummary& summary, const std::string& who) {
 
 }  // namespace
 
-Result<PackageSummary> write_package(const PackageSource& source, const StationKeys& keys,
-                                     const std::optional<AuditLogPlace>& audit_log,
-                                     const std::string& who, const Clock& clock,
-                                     const fs::path& out, int threads, const Progress& progress) {
+Result<PackageSummary> write_package(const PackageSource& source, const Seal& seal,
+                                     const Clock& clock, const fs::path& out, int threads,
+                                     const Progress& progress) {
   if (const auto place = check_place(source, out); !place) return forward(place);
   const auto content = read_package_source(source);
   if (!content) return forward(content);
@@ -161,21 +174,29 @@ Result<PackageSummary> write_package(const PackageSource& source, const StationK
   for (const auto& [path, digest] : *sealed) sums[path] = digest.sha256;
   if (const auto linked = content->check_links(sums); !linked) return forward(linked);
 
-  const auto tag_manifest = write_tags(*content, *sealed, keys, audit_log.has_value(), staged);
+  const auto tag_manifest = write_tags(*content, *sealed, seal, staged);
   if (!tag_manifest) return forward(tag_manifest);
   const PackageSummary summary = {content->case_number, content->files.size(), content->bytes,
                                   sha256_hex(*tag_manifest)};
-  const auto cms = cms_sign(keys, *tag_manifest, clock.utc_now());
+  const auto cms = cms_sign(seal.keys, *tag_manifest, clock.utc_now());
   if (!cms) return forward(cms);
   TagFiles signatures(staged);
-  for (const auto& written : {signatures.write(ed25519_file, ed25519_sign(keys, *tag_manifest)),
-                              signatures.write(cms_file, *cms)}) {
+  for (const auto& written :
+       {signatures.write(ed25519_file, ed25519_sign(seal.keys, *tag_manifest)),
+        signatures.write(cms_file, *cms)}) {
     if (!written) return forward(written);
   }
-  if (audit_log) {
-    AuditLogPlace log = *audit_log;
+  if (seal.time_stamper) {
+    const auto stamp = stamped(seal.time_stamper, *cms);
+    if (!stamp) return forward(stamp);
+    if (const auto written = signatures.write(time_stamp_file, *stamp); !written) {
+      return forward(written);
+    }
+  }
+  if (seal.audit_log) {
+    AuditLogPlace log = *seal.audit_log;
     if (log.station.empty()) log.station = content->station;
-    const auto entry = append_audit_entry(log, audit_event(summary, who), keys, clock);
+    const auto entry = append_audit_entry(log, audit_event(summary, seal.who), seal.keys, clock);
     if (!entry) return forward(entry);
     if (const auto written = signatures.write(audit_entry_file, *entry + "\n"); !written) {
       return forward(written);

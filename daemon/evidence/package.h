@@ -10,6 +10,7 @@
 #include "daemon/evidence/audit_log.h"
 #include "daemon/evidence/package_source.h"
 #include "daemon/evidence/station_keys.h"
+#include "daemon/evidence/time_stamp.h"
 
 namespace skullstation {
 
@@ -26,6 +27,7 @@ inline constexpr const char* certificate_file = "signature/certificate.pem";
 // Not in the tag manifest, since they are made of it:
 inline constexpr const char* ed25519_file = "signature/ed25519.sig";
 inline constexpr const char* cms_file = "signature/cms.p7s";
+inline constexpr const char* time_stamp_file = "signature/time_stamp.tsr";
 inline constexpr const char* audit_entry_file = "signature/audit_entry.json";
 inline constexpr const char* signature_sums_file = "signature/sha256.txt";
 
@@ -39,17 +41,23 @@ struct PackageSummary {
   std::string tag_manifest_sha256;  ///< names the package: the signatures and the audit log have it
 };
 
-/// Seals a case: copies its files into a bag (each is read once), writes manifests, provenance and
-/// signatures, and, if there is an audit log, the entry of it. The bag appears whole or not at all,
-/// and never before its audit entry. The same case gives the same bytes but for signature/cms.p7s,
-/// signature/audit_entry.json and signature/sha256.txt, which carry the time. Memory does not grow
-/// with the files' size.
-/// Fails with `usage` where `out` is there already or lies in what is to be sealed, `cancelled` on
-/// request.
-Result<PackageSummary> write_package(const PackageSource& source, const StationKeys& keys,
-                                     const std::optional<AuditLogPlace>& audit_log,
-                                     const std::string& who, const Clock& clock,
-                                     const std::filesystem::path& out, int threads,
-                                     const Progress& progress = {});
+/// Who seals, and what witnesses it.
+struct Seal {
+  const StationKeys& keys;
+  std::optional<AuditLogPlace> audit_log;  ///< absent: no entry is made
+  std::string who;
+  TimeStamper time_stamper;  ///< stamps signature/cms.p7s; empty: no stamp
+};
+
+/// Seals a case: copies its files into a bag (each is read once), writes manifests, provenance,
+/// signatures and, if it is asked for, an authority's time stamp and the entry in the audit log.
+/// The bag appears whole or not at all, and never before its audit entry. The same case gives the
+/// same bytes but for signature/cms.p7s, signature/time_stamp.tsr, signature/audit_entry.json and
+/// signature/sha256.txt, which carry the time. Memory does not grow with the files' size.
+/// Fails with `usage` where `out` is there already or lies in what is to be sealed, as the time
+/// stamper does, `cancelled` on request.
+Result<PackageSummary> write_package(const PackageSource& source, const Seal& seal,
+                                     const Clock& clock, const std::filesystem::path& out,
+                                     int threads, const Progress& progress = {});
 
 }  // namespace skullstation

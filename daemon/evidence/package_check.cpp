@@ -40,6 +40,7 @@ class PackageReader {
     if (tags) check_tag_files(*tags);
     check_signature_sums();
     check_signatures();
+    check_time_stamp();
     check_audit_entry();
     const auto payload = manifest(manifest_file);
     if (const auto read = check_payload(payload.value_or(Sums{})); !read) return forward(read);
@@ -145,7 +146,8 @@ class PackageReader {
     signature_files_ = manifest(signature_sums_file).value_or(Sums{});
     for (const auto& [path, sum] : signature_files_) {
       check_sum(path, sum, "is not as it was written (or signature/sha256.txt is not)");
-      if (path != ed25519_file && path != cms_file && path != audit_entry_file) {
+      if (path != ed25519_file && path != cms_file && path != time_stamp_file &&
+          path != audit_entry_file) {
         find(PackageFault::extra, path, "is no signature, and signature/sha256.txt lists it");
       }
     }
@@ -194,13 +196,31 @@ class PackageReader {
                      check_.ed25519_fingerprint, by_certificate.error().message()));
   }
 
-  void check_audit_entry() {
+  /// A seal that not every package has: its bytes, if it is there. It is missing where the metadata
+  /// promises it.
+  const std::string* optional_seal(const char* file) {
     const auto metadata = nlohmann::json::parse(tag_text(metadata_file), nullptr, false);
     const bool promised = metadata.is_object() && metadata.contains("sealed_with") &&
                           metadata["sealed_with"].is_array() &&
-                          std::ranges::count(metadata["sealed_with"], audit_entry_file) > 0;
-    if (!promised && !there_.contains(audit_entry_file)) return;
-    const std::string* text = tag_file(audit_entry_file);
+                          std::ranges::count(metadata["sealed_with"], file) > 0;
+    return promised || there_.contains(file) ? tag_file(file) : nullptr;
+  }
+
+  void check_time_stamp() {
+    const std::string* answer = optional_seal(time_stamp_file);
+    if (answer == nullptr) return;
+    const auto stamp = read_time_stamp(*answer, tag_text(cms_file));
+    if (!stamp) {
+      find(PackageFault::signature, time_stamp_file,
+           fmt::format("{} (of {})", stamp.error().what, cms_file));
+      return;
+    }
+    check_.time_stamp = *stamp;
+    if (trust_) check_.time_stamp_trusted = trusts_time_stamp(*trust_, *answer).has_value();
+  }
+
+  void check_audit_entry() {
+    const std::string* text = optional_seal(audit_entry_file);
     if (text == nullptr) return;
     const std::string line = text->substr(0, text->find('\n'));
     auto entry = parse_audit_entry(line, audit_entry_file);

@@ -10,6 +10,7 @@
 #include "daemon/evidence/audit_entry.h"
 #include "daemon/evidence/block_list.h"
 #include "daemon/evidence/cms_signature.h"
+#include "daemon/evidence/time_stamp.h"
 #include "daemon/evidence/trust.h"
 
 namespace skullstation {
@@ -40,6 +41,10 @@ struct PackageCheck {
   /// signed.
   std::optional<bool> trusted;
   std::optional<AuditEntry> audit_entry;  ///< absent: none in the package, or not valid
+  std::optional<TimeStamp> time_stamp;    ///< likewise
+  /// Is the stamp's authority a trusted one? Absent: no stamp, or no trust was given. An authority
+  /// that is not among the trusted is no finding: the station's own keys are what must be.
+  std::optional<bool> time_stamp_trusted;
 };
 
 /// Checks a package by what lies in it and by `trust` alone: no network, no station. Fails only if

@@ -22,10 +22,13 @@ StepChain station_chain(const std::string& quality, const StepLimits& limits,
   package.inputs = {std::string(scan_step), "reconstruct", "approximate"};
   package.promises = {"bagit.txt", "manifest-sha256.txt", "tagmanifest-sha256.txt",
                       "signature/ed25519.sig"};
-  package.station =
-      nlohmann::json{{"keys_folder", seal.keys_folder}, {"audit_log", seal.audit_log}}.dump();
+  package.station = nlohmann::json{{"keys_folder", seal.keys_folder},
+                                   {"audit_log", seal.audit_log},
+                                   {"time_stamp_url", seal.time_stamp_url}}
+                        .dump();
   package.on_approval = seal.on_approval;
   package.limits = limits;
+  package.limits.network = !seal.time_stamp_url.empty();
   return {reconstruct, approximate, package};
 }
 

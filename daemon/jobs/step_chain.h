@@ -14,6 +14,7 @@ struct StepLimits {
   std::uint64_t file_bytes = std::uint64_t{8} << 30;    ///< of each file that it writes
   std::chrono::seconds cpu_time = std::chrono::hours{8};
   std::chrono::seconds time = std::chrono::hours{4};
+  bool network = false;  ///< may it speak to others?
 };
 
 /// One kind of step in the chain of a case.
@@ -45,6 +46,7 @@ struct SealSettings {
   bool on_approval = true;  ///< else as soon as the result is there
   std::string keys_folder;
   std::string audit_log;
+  std::string time_stamp_url;  ///< empty: no stamp, and no network for the step
 };
 
 /// What the station does with a scan:

@@ -32,9 +32,9 @@ StepChain chain_of(const JobsConfig& jobs, const EvidenceConfig& evidence) {
   limits.memory_bytes = static_cast<std::uint64_t>(jobs.memory_mib) << 20;
   limits.time = std::chrono::minutes(jobs.time_limit_min);
   limits.cpu_time = 4 * limits.time;
-  return station_chain(
-      quality.at(static_cast<std::size_t>(jobs.quality)), limits,
-      {evidence.seal == SealTime::approved, evidence.keys_folder, evidence.audit_log});
+  return station_chain(quality.at(static_cast<std::size_t>(jobs.quality)), limits,
+                       {evidence.seal == SealTime::approved, evidence.keys_folder,
+                        evidence.audit_log, evidence.time_stamp_url});
 }
 
 void sleep_for(std::chrono::milliseconds time, const std::stop_token& stop) {

@@ -230,8 +230,10 @@ std::vector<Error> invalid_values(const StationConfig& config) {
       complain(key + ".name", fmt::format("\"{}\" is used twice", target.name));
     }
   }
-  for (const auto& [key, url] : {std::pair("museum.rights_url", config.museum.rights_url),
-                                 std::pair("museum.base_url", config.museum.base_url)}) {
+  for (const auto& [key, url] :
+       {std::pair("museum.rights_url", config.museum.rights_url),
+        std::pair("museum.base_url", config.museum.base_url),
+        std::pair("evidence.time_stamp_url", config.evidence.time_stamp_url)}) {
     if (!url.empty() && !url.starts_with("https://") && !url.starts_with("http://")) {
       complain(key, "must be an address that begins with https:// or http://");
     }
@@ -301,6 +303,8 @@ void visit_config(StationConfig& config, ConfigFields& fields) {
                  "file of the station's audit log; empty: none is kept");
     fields.field("seal", config.evidence.seal, {"approved", "built"},
                  "when skullstationd seals and delivers a case: once it is approved, or at once");
+    fields.field("time_stamp_url", config.evidence.time_stamp_url,
+                 "RFC 3161 authority that stamps every package; empty: none");
   });
   fields.table("delivery", [&] {
     fields.field("folder", config.delivery.folder, "of the outbox");

@@ -77,6 +77,7 @@ struct EvidenceConfig {
   std::string keys_folder = "keys";
   std::string audit_log;  ///< file; empty: none is kept
   SealTime seal = SealTime::approved;
+  std::string time_stamp_url;  ///< empty: packages carry no time stamp
 };
 
 /// What `skullstation exhibit` says of whose things it shows.

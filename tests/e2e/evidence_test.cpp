@@ -6,6 +6,7 @@
 
 #include <csignal>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "core/file.h"
 #include "core/random.h"
@@ -13,6 +14,7 @@
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/evidence/small_case.h"
+#include "tests/unit/evidence/time_stamp_authority.h"
 
 namespace skullstation::testing {
 namespace {
@@ -34,6 +36,12 @@ class Evidence : public ::testing::Test {
             "--by",        "Dr. Bone",
             "--audit-log", folder_ / "audit.jsonl",
             "--threads",   "2"};
+  }
+  /// trust.pem: the station's certificate and another one.
+  void write_trust(const fs::path& other) {
+    const std::string both =
+        read_file(folder_ / "keys/certificate.pem").value() + read_file(other).value();
+    ASSERT_TRUE(write_file_durably(folder_ / "trust.pem", both));
   }
   ProcessResult audit_verify(const std::vector<std::string>& packages) {
     std::vector<std::string> words = {"audit", "verify", folder_ / "audit.jsonl"};
@@ -68,6 +76,39 @@ TEST_F(Evidence, IsSealedVerifiedDamagedAndNamed) {
       nlohmann::json::parse(skullstation_cli({"verify", "--json", folder_ / "bag"}).out);
   EXPECT_EQ(json["intact"], false);
   EXPECT_EQ(json["findings"][0]["byte_ranges"], nlohmann::json::parse("[[262144,524288]]"));
+}
+
+TEST_F(Evidence, IsStampedByAnAuthorityOnTheNetwork) {
+  const TimeStampAuthority authority(folder_ / "authority");
+  const Process server({"/usr/bin/python3",
+                        SKULLSTATION_SOURCE_DIR "/tests/e2e/time_stamp_server.py",
+                        authority.folder().string()});
+  const fs::path port_file = authority.folder() / "port";
+  for (int i = 0; i < 600 && !fs::exists(port_file); ++i) std::this_thread::sleep_for(50ms);
+  const std::string address = "http://127.0.0.1:" + read_file(port_file).value();
+  write_small_case(folder_.path());
+  const auto package = [&](const std::string& url) {
+    auto words = package_words("bag");
+    words.insert(words.end(), {"--time-stamp", url});
+    return skullstation_cli(words);
+  };
+  const auto busy = package(address + "/busy");
+  EXPECT_NE(busy.exit_code, 0);
+  EXPECT_THAT(busy.err, HasSubstr("time stamp of " + address + "/busy: "));
+  EXPECT_FALSE(fs::exists(folder_ / "bag"));
+  const auto sealed = package(address + "/");
+  ASSERT_EQ(sealed.exit_code, 0) << sealed.err;
+  EXPECT_THAT(sealed.out, HasSubstr("signed, time stamped, in the audit log"));
+
+  write_trust(authority.certificate());
+  const auto verified =
+      skullstation_cli({"verify", folder_ / "bag", "--trust", folder_ / "trust.pem"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out;
+  EXPECT_THAT(verified.out, HasSubstr("by the clock of CN = Authority, whom you trust"));
+  fs::remove(folder_ / "bag/signature/time_stamp.tsr");
+  const auto removed = skullstation_cli({"verify", folder_ / "bag"});
+  EXPECT_EQ(removed.exit_code, 3);
+  EXPECT_THAT(removed.out, HasSubstr("signature/time_stamp.tsr: is missing"));
 }
 
 TEST_F(Evidence, TheAuditLogIsShownAndVerifiedAgainstPackages) {

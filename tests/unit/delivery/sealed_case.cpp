@@ -89,8 +89,8 @@ SealedPackage seal_small_case(const fs::path& folder, std::size_t large_bytes) {
   // A JPEG, though its name says PNG: what counts is the content.
   replace_file(folder, folder / "session/images/p0_c0_000.png", encode_jpeg(gradient(), 90));
   replace_file(folder, folder / "session/images/p0_c0_001.png", encode_png(gradient()));
-  const auto sealed = write_package(source, test_keys(), std::nullopt, "test", SimulatedClock(),
-                                    folder / "package", 1);
+  const auto sealed = write_package(source, {test_keys(), std::nullopt, "test", {}},
+                                    SimulatedClock(), folder / "package", 1);
   if (!sealed) throw std::runtime_error(sealed.error().message());
   return read_sealed_package(folder / "package").value();
 }

@@ -24,9 +24,10 @@ class DamagedPackage : public ::testing::Test {
  protected:
   DamagedPackage() {
     const PackageSource source = testing::write_small_case(folder_.path());
-    const auto sealed =
-        write_package(source, testing::test_keys(), AuditLogPlace{folder_ / "audit.jsonl", "ST-01"},
-                      "examiner", SimulatedClock(), bag_, 1);
+    const auto sealed = write_package(
+        source,
+        {testing::test_keys(), AuditLogPlace{folder_ / "audit.jsonl", "ST-01"}, "examiner", {}},
+        SimulatedClock(), bag_, 1);
     if (!sealed) throw std::runtime_error(sealed.error().message());
   }
 
@@ -73,9 +74,9 @@ TEST_F(DamagedPackage, NotDamagedIsAsItWasSealed) {
 }
 
 TEST_F(DamagedPackage, WithoutAnAuditLogIsWholeToo) {
-  const auto sealed =
-      write_package(testing::write_small_case(folder_ / "again"), testing::test_keys(),
-                    std::nullopt, "x", SimulatedClock(), folder_ / "bag2", 1);
+  const auto sealed = write_package(testing::write_small_case(folder_ / "again"),
+                                    {testing::test_keys(), std::nullopt, "x", {}}, SimulatedClock(),
+                                    folder_ / "bag2", 1);
   ASSERT_TRUE(sealed);
   const auto checked = check_package(folder_ / "bag2", std::nullopt);
   EXPECT_THAT(checked->findings, IsEmpty());
@@ -183,9 +184,8 @@ TEST_F(DamagedPackage, AStrangerInTheUnsignedSumsIsFound) {
 
 TEST_F(DamagedPackage, TheAuditEntryOfAnotherPackageIsFound) {
   auto other = testing::write_small_case(folder_ / "other", 1000);
-  ASSERT_TRUE(write_package(other, testing::test_keys(),
-                            AuditLogPlace{folder_ / "audit.jsonl", "ST-01"}, "x", SimulatedClock(),
-                            folder_ / "bag2", 1));
+  const Seal seal{testing::test_keys(), AuditLogPlace{folder_ / "audit.jsonl", "ST-01"}, "x", {}};
+  ASSERT_TRUE(write_package(other, seal, SimulatedClock(), folder_ / "bag2", 1));
   const std::string before = *read_file(bag_ / audit_entry_file);
   const std::string entry = *read_file(folder_ / "bag2" / audit_entry_file);
   std::string sums = *read_file(bag_ / signature_sums_file);

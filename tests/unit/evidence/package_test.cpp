@@ -11,6 +11,7 @@
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/evidence/small_case.h"
+#include "tests/unit/evidence/time_stamp_authority.h"
 
 namespace skullstation {
 namespace {
@@ -23,8 +24,8 @@ using testing::TemporaryFolder;
 class Package : public ::testing::Test {
  protected:
   Result<PackageSummary> seal(const fs::path& out, int threads = 2) {
-    return write_package(source_, testing::test_keys(), audit_log_, "examiner", clock_, out,
-                         threads);
+    return write_package(source_, {testing::test_keys(), audit_log_, "examiner", time_stamper_},
+                         clock_, out, threads);
   }
   /// The error of sealing; nothing may be left of it.
   std::string refusal() {
@@ -39,6 +40,7 @@ class Package : public ::testing::Test {
   SimulatedClock clock_;
   PackageSource source_ = testing::write_small_case(folder_.path());
   std::optional<AuditLogPlace> audit_log_ = AuditLogPlace{folder_ / "audit.jsonl", "ST-01"};
+  TimeStamper time_stamper_;
 };
 
 TEST_F(Package, HoldsEveryFileAndSaysWhatItIs) {
@@ -146,6 +148,41 @@ TEST_F(Package, IsVerifiedByCoreutilsAndOpenssl) {
   EXPECT_NE(shell(cms), 0);
 }
 
+TEST_F(Package, CarriesTheStampOfAnAuthority) {
+  const testing::TimeStampAuthority authority(folder_ / "authority");
+  time_stamper_ = authority.stamper();
+  ASSERT_TRUE(seal(folder_ / "bag"));
+  const auto trust = read_trust(authority.certificate());
+  const auto checked = check_package(folder_ / "bag", *trust).value();
+  ASSERT_TRUE(checked.time_stamp);
+  EXPECT_EQ(checked.time_stamp->authority, "CN = Authority");
+  EXPECT_EQ(checked.time_stamp_trusted, true);
+  // The station's own keys are not among the trusted: that is the one finding.
+  ASSERT_EQ(checked.findings.size(), 1U);
+  EXPECT_EQ(checked.findings.front().fault, PackageFault::trust);
+  const auto by_station = read_trust(testing::test_keys_folder() / "certificate.pem");
+  const auto other = check_package(folder_ / "bag", *by_station).value();
+  EXPECT_TRUE(other.findings.empty());
+  EXPECT_EQ(other.time_stamp_trusted, false);
+  EXPECT_EQ(check_package(folder_ / "bag", std::nullopt)->time_stamp_trusted, std::nullopt);
+  // As an examiner without this program checks it.
+  const auto openssl =
+      Process({"/usr/bin/openssl", "ts", "-verify", "-data", (folder_ / "bag" / cms_file).string(),
+               "-in", (folder_ / "bag" / time_stamp_file).string(), "-CAfile",
+               authority.certificate().string()})
+          .wait();
+  EXPECT_EQ(openssl.exit_code, 0) << openssl.err;
+}
+
+TEST_F(Package, IsNotSealedWithoutTheStampThatWasAskedFor) {
+  time_stamper_ = [](const std::string&) -> Result<std::string> {
+    return fail(ErrorKind::hardware, "tsa.example", "does not answer");
+  };
+  EXPECT_THAT(refusal(), HasSubstr("time stamp of tsa.example: does not answer"));
+  time_stamper_ = [](const std::string&) -> Result<std::string> { return "<html>"; };
+  EXPECT_THAT(refusal(), HasSubstr("time stamp: is no answer of a time-stamping authority"));
+}
+
 TEST_F(Package, AuditEntryIsTheLogsHead) {
   ASSERT_TRUE(seal(folder_ / "bag"));
   const std::string entry = text("bag/signature/audit_entry.json");
@@ -225,8 +262,8 @@ TEST_F(Package, StopsOnRequestAndLeavesNothing) {
     if (fraction > 0.1) stop.request_stop();
   };
   progress.stop = stop.get_token();
-  const auto sealed = write_package(source_, testing::test_keys(), audit_log_, "examiner", clock_,
-                                    folder_ / "bag", 2, progress);
+  const auto sealed = write_package(source_, {testing::test_keys(), audit_log_, "examiner", {}},
+                                    clock_, folder_ / "bag", 2, progress);
   ASSERT_FALSE(sealed);
   EXPECT_EQ(sealed.error().kind, ErrorKind::cancelled);
   EXPECT_FALSE(fs::exists(folder_ / "bag"));

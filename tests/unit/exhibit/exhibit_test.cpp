@@ -84,7 +84,7 @@ class ExhibitTest : public ::testing::Test {
               "https://creativecommons.org/licenses/by-nc/4.0/", "https://museum.example/cases"};
   }
   Result<std::vector<std::string>> exhibit() {
-    const auto sealed = write_package(source_, testing::test_keys(), std::nullopt, "test",
+    const auto sealed = write_package(source_, {testing::test_keys(), std::nullopt, "test", {}},
                                       SimulatedClock(), folder_ / "package", 1);
     if (!sealed) return forward(sealed);
     return write_exhibit(folder_ / "package", label_, "1.2.3", folder_ / "exhibit");

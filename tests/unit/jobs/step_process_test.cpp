@@ -84,6 +84,13 @@ TEST_F(StepProcessTest, ThereIsNoNetwork) {
   EXPECT_EQ(*read_file(folder_ / "out" / "made.txt"), "no network, none at all");
 }
 
+TEST_F(StepProcessTest, UnlessItNeedsOne) {
+  auto asks = process(R"({"do": "network"})");
+  asks.limits.network = true;
+  EXPECT_EQ(end_of(asks), "");
+  EXPECT_EQ(*read_file(folder_ / "out" / "made.txt"), "network, some");
+}
+
 TEST_F(StepProcessTest, ItCanBeStopped) {
   std::stop_source stop;
   auto sleeps = process(R"({"sleep_ms": 20000})");

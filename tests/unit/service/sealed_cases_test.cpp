@@ -67,8 +67,8 @@ class SealedCases : public ::testing::Test {
       fs::remove_all(out);
       if (job->step == seal_step) {
         const PackageSource source = testing::write_small_case(folder_ / "made");
-        EXPECT_TRUE(
-            write_package(source, testing::test_keys(), std::nullopt, "test", clock_, out, 1));
+        EXPECT_TRUE(write_package(source, {testing::test_keys(), std::nullopt, "test", {}}, clock_,
+                                  out, 1));
       } else {
         fs::create_directories(out);
         std::ofstream(out / "made.txt") << job->id;
