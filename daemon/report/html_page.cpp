@@ -82,10 +82,10 @@ std::string html_of(const ErrorBars& chart) {
       "<svg viewBox=\"0 0 700 {:.0f}\" role=\"img\" style=\"max-width:900px;font-size:11px\">\n"
       "<text x=\"{:.0f}\" y=\"12\">&#9679; {} &#160; &#9675; {} [{}]</text>\n",
       height, left, escaped(chart.ours), escaped(chart.reference), escaped(chart.unit));
-  for (double tick = 0.0; tick <= most; tick += 5.0) {
+  for (int tick = 0; tick <= most; tick += 5) {
     html += fmt::format(
         "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.0f}\" y2=\"{2:.0f}\" stroke=\"#ddd\"/>"
-        "<text x=\"{0:.1f}\" y=\"{3:.0f}\" text-anchor=\"middle\">{4:.0f}</text>\n",
+        "<text x=\"{0:.1f}\" y=\"{3:.0f}\" text-anchor=\"middle\">{4}</text>\n",
         x_of(tick), top, height - 18.0, height - 6.0, tick);
   }
   for (std::size_t i = 0; i < chart.rows.size(); ++i) {
