@@ -67,9 +67,9 @@ std::vector<SkinDirection> skin_directions_of(const SkullTemplate& skull, const 
 }  // namespace
 
 Result<void> FaceModelOptions::validate() const {
-  if (const auto sound = skull.validate(); !sound) return sound;
-  if (const auto sound = head.validate(); !sound) return sound;
-  if (const auto sound = tissue.validate(); !sound) return sound;
+  if (const auto sound = skull.validate(); !sound) return forward(sound);
+  if (const auto sound = head.validate(); !sound) return forward(sound);
+  if (const auto sound = tissue.validate(); !sound) return forward(sound);
   return joint.validate();
 }
 
