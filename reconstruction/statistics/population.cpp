@@ -153,7 +153,7 @@ Belief skull_belief(const SkullTemplate& skull, const ShapeModel& model, const P
 Points3 completed_skull(const SkullTemplate& skull, const ShapeModel& model,
                         const Points3& vertices, const std::vector<bool>& observed) {
   const std::vector<int> seen = observed_outer(skull, observed);
-  const Points3 likely = shape_at(model, skull_belief(skull, model, vertices, observed).mean);
+  Points3 likely = shape_at(model, skull_belief(skull, model, vertices, observed).mean);
   if (seen.empty()) return likely;
   const Points3 seen_template = skull.vertices(seen, Eigen::all);
   const PointTree tree(seen_template);
