@@ -18,6 +18,7 @@
 #include "daemon/model/fitted_subjects.h"
 #include "daemon/model/model_source.h"
 #include "reconstruction/statistics/head_from_skull.h"
+#include "reconstruction/statistics/leave_one_out.h"
 #include "reconstruction/statistics/population.h"
 
 namespace skullstation {
@@ -146,21 +147,6 @@ VectorXd partial_least_squares(const Fold& fold) {
   return least_squares_path(fold.inputs, fold.outputs, fold.asked, components).col(best);
 }
 
-bool of_face(HeadRegion region) {
-  return region == HeadRegion::face || region == HeadRegion::nose || region == HeadRegion::lips ||
-         region == HeadRegion::eyes;
-}
-
-double tissue_error_mm(const TissueModel& tissue, const VectorXd& foretold, const VectorXd& truth) {
-  double sum = 0.0, count = 0.0;
-  for (Index v = 0; v < truth.size(); ++v) {
-    if (!tissue.modelled[static_cast<std::size_t>(v)] || std::isnan(truth[v])) continue;
-    sum += std::abs(foretold[v] - truth[v]);
-    ++count;
-  }
-  return sum / count;
-}
-
 VectorXd standardised_facts(const ModelSubject& subject) {
   const PersonFacts& facts = subject.facts;
   return VectorXd{{2.0 * (facts.male.value_or(0.5) - 0.5),
@@ -271,15 +257,10 @@ Result<void> run(const std::filesystem::path& subject_folder,
     std::size_t row = 0;
     const auto note = [&](const VectorXd& head, const VectorXd& depths) {
       const Points3 shape = shape_at(models->head, head);
-      double sum = 0.0, of = 0.0;
-      for (Index v = 0; v < shape.rows(); ++v) {
-        if (!of_face(templates->head.region[static_cast<std::size_t>(v)])) continue;
-        sum += std::abs((shape.row(v) - subject.head.row(v)).dot(normals.row(v)));
-        ++of;
-      }
-      rows[row].face_mm[n] = sum / of;
+      rows[row].face_mm[n] = mean_facial_error_mm(
+          templates->head, (shape - subject.head).cwiseProduct(normals).rowwise().sum());
       rows[row].depth_mm[n] =
-          tissue_error_mm(*tissue, tissue_at(*tissue, depths), subject.tissue_mm);
+          mean_depth_error_mm(*tissue, tissue_at(*tissue, depths), subject.tissue_mm);
       ++row;
     };
     const auto joint = joint_of(models->skull, models->skulls, models->head, models->heads, *tissue,

@@ -50,21 +50,6 @@ Result<Population> population_of(const std::vector<SubjectFit>& fits, bool allow
   return population;
 }
 
-/// Mean absolute error over the face with nose, lips and eyes.
-double face_error_mm(const HeadTemplate& head, const Eigen::VectorXd& errors) {
-  double sum = 0.0;
-  double count = 0.0;
-  for (Index v = 0; v < errors.size(); ++v) {
-    const HeadRegion region = head.region[static_cast<std::size_t>(v)];
-    const bool face = region == HeadRegion::face || region == HeadRegion::nose ||
-                      region == HeadRegion::lips || region == HeadRegion::eyes;
-    if (!face) continue;
-    sum += std::abs(errors[v]);
-    count += 1.0;
-  }
-  return sum / std::max(1.0, count);
-}
-
 /// Two-sided p of Wilcoxon's signed rank test (1945), normal approximation.
 double wilcoxon_p(std::vector<double> differences) {
   std::erase(differences, 0.0);
@@ -290,13 +275,13 @@ Result<CommandReport> run(const ModelEvaluateCommand& command, const CommonOptio
     for (Prediction& prediction : predictions) {
       const ForetoldErrors& errors = subject.*prediction.errors;
       const Eigen::ArrayXd ratio = errors.head_mm.cwiseAbs().cwiseQuotient(errors.head_sd_mm);
-      prediction.face_mm += face_error_mm(templates->head, errors.head_mm) / count;
+      prediction.face_mm += mean_facial_error_mm(templates->head, errors.head_mm) / count;
       prediction.tissue_mm += errors.tissue_mm / count;
       prediction.coverage +=
           static_cast<double>((ratio < 1.2816).count()) / static_cast<double>(ratio.size()) / count;
     }
-    gains.push_back(face_error_mm(templates->head, subject.mean.head_mm) -
-                    face_error_mm(templates->head, subject.given_skull.head_mm));
+    gains.push_back(mean_facial_error_mm(templates->head, subject.mean.head_mm) -
+                    mean_facial_error_mm(templates->head, subject.given_skull.head_mm));
   }
   const double p = wilcoxon_p(gains);
   CommandReport report;

@@ -1,29 +1,15 @@
 #include "daemon/evidence/cms_signature.h"
 
 #include <fmt/format.h>
-#include <openssl/pem.h>
-
 #include <ctime>
 
 #include "core/file.h"
+#include "daemon/evidence/certificate.h"
 #include "daemon/evidence/openssl_handles.h"
 
 namespace skullstation {
 
 namespace {
-
-CertificateHandle next_certificate(const BioHandle& pem) {
-  CertificateHandle certificate(PEM_read_bio_X509(pem.get(), nullptr, nullptr, nullptr));
-  ERR_clear_error();
-  return certificate;
-}
-
-std::string subject(X509* certificate) {
-  const BioHandle bio = collecting();
-  X509_NAME_print_ex(bio.get(), X509_get_subject_name(certificate), 0,
-                     XN_FLAG_ONELINE & ~ASN1_STRFLGS_ESC_MSB);
-  return collected(bio);
-}
 
 std::string der_of(X509* certificate) {
   const BioHandle bio = collecting();
@@ -45,11 +31,7 @@ std::optional<UtcTime> signing_time(CMS_SignerInfo* signer) {
         signer, OBJ_nid2obj(NID_pkcs9_signingTime), -3, V_ASN1_GENERALIZEDTIME));
   }
   ERR_clear_error();
-  std::tm broken{};
-  if (value == nullptr || ASN1_TIME_to_tm(reinterpret_cast<ASN1_TIME*>(value), &broken) != 1) {
-    return std::nullopt;
-  }
-  return std::chrono::system_clock::from_time_t(::timegm(&broken));
+  return utc_of(reinterpret_cast<ASN1_TIME*>(value));
 }
 
 tl::unexpected<Error> not_verified(std::string_view name, std::string what) {
@@ -126,7 +108,7 @@ std::optional<CmsSigner> certificate_owner(std::string_view certificate_pem) {
   const CertificateHandle certificate = next_certificate(pem);
   if (!certificate) return std::nullopt;
   CmsSigner owner;
-  owner.name = subject(certificate.get());
+  owner.name = subject_of(certificate.get());
   owner.fingerprint = sha256_hex(der_of(certificate.get()));
   return owner;
 }

@@ -2,16 +2,13 @@
 
 #include <fmt/format.h>
 #include <openssl/ess.h>
-#include <openssl/pem.h>
-#include <openssl/rand.h>
 #include <openssl/ts.h>
 
+#include <algorithm>
 #include <array>
-#include <ctime>
 #include <optional>
 
-#include "core/sha256.h"
-#include "daemon/evidence/openssl_handles.h"
+#include "daemon/evidence/certificate.h"
 
 namespace skullstation {
 
@@ -100,25 +97,12 @@ bool answers(TS_TST_INFO* info, std::string_view query) {
   return nonce != nullptr && ASN1_INTEGER_cmp(nonce, TS_REQ_get_nonce(asked.get())) == 0;
 }
 
-std::optional<UtcTime> time_of(TS_TST_INFO* info) {
-  std::tm broken{};
-  if (ASN1_TIME_to_tm(TS_TST_INFO_get_time(info), &broken) != 1) return std::nullopt;
-  return std::chrono::system_clock::from_time_t(::timegm(&broken));
-}
-
 std::string hexadecimal(const ASN1_INTEGER* number) {
   const BigNumberHandle value(ASN1_INTEGER_to_BN(number, nullptr));
   char* digits = BN_bn2hex(value.get());
   std::string text = digits;
   OPENSSL_free(digits);
   return text;
-}
-
-std::string subject(X509* certificate) {
-  const BioHandle bio = collecting();
-  X509_NAME_print_ex(bio.get(), X509_get_subject_name(certificate), 0,
-                     XN_FLAG_ONELINE & ~ASN1_STRFLGS_ESC_MSB);
-  return collected(bio);
 }
 
 }  // namespace
@@ -169,9 +153,9 @@ Result<TimeStamp> read_time_stamp(std::string_view answer, std::string_view mess
     return no_stamp("was signed by a certificate that may not stamp times");
   }
   if (!names(token, signer)) return no_stamp("does not name the certificate that signed it");
-  const auto time = time_of(info);
+  const auto time = utc_of(TS_TST_INFO_get_time(info));
   if (!time) return no_stamp("holds no time");
-  return TimeStamp{subject(signer), to_iso8601(*time), *time,
+  return TimeStamp{subject_of(signer), to_iso8601(*time), *time,
                    hexadecimal(TS_TST_INFO_get_serial(info))};
 }
 
@@ -180,24 +164,9 @@ Result<void> trusts_time_stamp(const Trust& trust, std::string_view answer) {
   PKCS7* token = response ? TS_RESP_get_token(response.get()) : nullptr;
   TS_TST_INFO* info = response ? TS_RESP_get_tst_info(response.get()) : nullptr;
   X509* signer = token != nullptr ? signer_of(token) : nullptr;
-  const auto time = info != nullptr ? time_of(info) : std::nullopt;
+  const auto time = info != nullptr ? utc_of(TS_TST_INFO_get_time(info)) : std::nullopt;
   if (signer == nullptr || !time) return no_stamp("can't be read");
-  const CertificateStoreHandle store(X509_STORE_new());
-  for (const std::string& pem : trust.certificates_pem) {
-    const BioHandle bio = reading_from(pem);
-    const CertificateHandle certificate(PEM_read_bio_X509(bio.get(), nullptr, nullptr, nullptr));
-    X509_STORE_add_cert(store.get(), certificate.get());
-  }
-  const StoreContextHandle context(X509_STORE_CTX_new());
-  X509_STORE_CTX_init(context.get(), store.get(), signer, token->d.sign->cert);
-  X509_STORE_CTX_set_purpose(context.get(), X509_PURPOSE_TIMESTAMP_SIGN);
-  // An authority's own certificate in the examiner's hand is enough; it may have expired since.
-  X509_STORE_CTX_set_flags(context.get(), X509_V_FLAG_PARTIAL_CHAIN);
-  X509_STORE_CTX_set_time(context.get(), 0, std::chrono::system_clock::to_time_t(*time));
-  if (X509_verify_cert(context.get()) == 1) return {};
-  return no_stamp(
-      fmt::format("its authority does not lead to a trusted certificate ({})",
-                  X509_verify_cert_error_string(X509_STORE_CTX_get_error(context.get()))));
+  return leads_to_trusted(trust, signer, token->d.sign->cert, *time, X509_PURPOSE_TIMESTAMP_SIGN);
 }
 
 }  // namespace skullstation

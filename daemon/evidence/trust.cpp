@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/file.h"
+#include "daemon/evidence/certificate.h"
 #include "daemon/evidence/openssl_handles.h"
 #include "daemon/evidence/signature.h"
 
@@ -14,10 +15,7 @@ namespace skullstation {
 namespace {
 
 CertificateHandle certificate_of(std::string_view pem) {
-  const BioHandle bio = reading_from(pem);
-  CertificateHandle certificate(PEM_read_bio_X509(bio.get(), nullptr, nullptr, nullptr));
-  ERR_clear_error();
-  return certificate;
+  return next_certificate(reading_from(pem));
 }
 
 std::string pem_of(X509* certificate) {
@@ -36,11 +34,9 @@ std::string public_pem_of(X509* certificate) {
 std::vector<std::string> certificates_in(std::string_view text) {
   std::vector<std::string> found;
   const BioHandle bio = reading_from(text);
-  while (const CertificateHandle certificate{
-      PEM_read_bio_X509(bio.get(), nullptr, nullptr, nullptr)}) {
+  while (const CertificateHandle certificate = next_certificate(bio)) {
     found.push_back(pem_of(certificate.get()));
   }
-  ERR_clear_error();
   return found;
 }
 
@@ -82,26 +78,34 @@ Result<void> trusts_certificate(const Trust& trust, std::string_view chain_pem, 
   }
   const CertificateHandle leaf = certificate_of(chain.front());
   if (trusts_key(trust, public_pem_of(leaf.get()))) return {};
-  const CertificateStoreHandle store(X509_STORE_new());
-  for (const std::string& pem : trust.certificates_pem) {
-    X509_STORE_add_cert(store.get(), certificate_of(pem).get());
-  }
   STACK_OF(X509)* between = sk_X509_new_null();
   for (std::size_t i = 1; i < chain.size(); ++i) {
     sk_X509_push(between, certificate_of(chain[i]).release());
   }
+  auto trusted = leads_to_trusted(trust, leaf.get(), between, time);
+  sk_X509_pop_free(between, X509_free);
+  if (!trusted) trusted.error().where = "certificate.pem";
+  return trusted;
+}
+
+Result<void> leads_to_trusted(const Trust& trust, X509* leaf, STACK_OF(X509) * between,
+                              UtcTime time, int purpose) {
+  const CertificateStoreHandle store(X509_STORE_new());
+  for (const std::string& pem : trust.certificates_pem) {
+    X509_STORE_add_cert(store.get(), certificate_of(pem).get());
+  }
   const StoreContextHandle context(X509_STORE_CTX_new());
-  X509_STORE_CTX_init(context.get(), store.get(), leaf.get(), between);
-  // A station's own certificate in the examiner's hand is enough. Its validity is judged at the
+  X509_STORE_CTX_init(context.get(), store.get(), leaf, between);
+  if (purpose != 0) X509_STORE_CTX_set_purpose(context.get(), purpose);
+  // The signer's own certificate in the examiner's hand is enough. Its validity is judged at the
   // time of signing: it may have expired since.
   X509_STORE_CTX_set_flags(context.get(), X509_V_FLAG_PARTIAL_CHAIN);
   X509_STORE_CTX_set_time(context.get(), 0, std::chrono::system_clock::to_time_t(time));
   const bool trusted = X509_verify_cert(context.get()) == 1;
   const int reason = X509_STORE_CTX_get_error(context.get());
-  sk_X509_pop_free(between, X509_free);
   ERR_clear_error();
   if (trusted) return {};
-  return fail(ErrorKind::bad_input, "certificate.pem",
+  return fail(ErrorKind::bad_input, subject_of(leaf),
               fmt::format("does not lead to a trusted certificate ({})",
                           X509_verify_cert_error_string(reason)));
 }

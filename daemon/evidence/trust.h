@@ -1,5 +1,7 @@
 #pragma once
 
+#include <openssl/x509.h>
+
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -25,5 +27,10 @@ bool trusts_key(const Trust& trust, std::string_view public_pem);
 /// Does the first certificate of `chain_pem` lead, at `time`, to a trusted certificate, or is its
 /// key a trusted key? Says why not.
 Result<void> trusts_certificate(const Trust& trust, std::string_view chain_pem, UtcTime time);
+
+/// The same of a certificate by itself, over those `between`; `purpose` as OpenSSL has it
+/// (X509_PURPOSE_TIMESTAMP_SIGN), 0: any.
+Result<void> leads_to_trusted(const Trust& trust, X509* leaf, STACK_OF(X509) * between,
+                              UtcTime time, int purpose = 0);
 
 }  // namespace skullstation

@@ -37,9 +37,8 @@ struct StepProcess {
 };
 
 /// Runs a step to its end in a process of its own, which
-/// - has no network unless the limits give it (seccomp: no sockets but local ones; no io_uring),
-/// and
-///   can't gain privileges,
+/// - has no network (seccomp: no sockets but local ones; no io_uring), unless the limits give it,
+/// - can't gain privileges,
 /// - has the limits' memory (RLIMIT_AS), CPU time (RLIMIT_CPU), file size and time,
 /// - yields to the scanner (nice 10) and is the first to go when memory runs out,
 /// - dies with this process, and whatever it started goes with it.

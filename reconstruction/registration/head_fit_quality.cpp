@@ -21,11 +21,6 @@ constexpr double kKept_mm = 2.0;
 constexpr double kKeptAngle_deg = 60.0;
 constexpr int kChunk = 256;
 
-bool is_face(HeadRegion region) {
-  return region == HeadRegion::face || region == HeadRegion::nose || region == HeadRegion::lips ||
-         region == HeadRegion::eyes;
-}
-
 }  // namespace
 
 void measure_head_fit(const HeadTemplate& head, const Points3& vertices, const TriangleMesh& scan,
@@ -53,7 +48,7 @@ void measure_head_fit(const HeadTemplate& head, const Points3& vertices, const T
     double weight = 0.0;
     for (int k = 0; k < 3; ++k) {
       const auto v = static_cast<std::size_t>(hit.place.corners[k]);
-      face = face && is_face(head.region[v]);
+      face = face && is_facial(head.region[v]);
       weight += hit.place.weights[k] * head.data_weight[v];
     }
     if (face) facial.push_back(hit.distance_mm);

@@ -12,6 +12,11 @@ std::string_view to_string(HeadRegion region) {
   return kNames[static_cast<std::size_t>(region)];
 }
 
+bool is_facial(HeadRegion region) {
+  return region == HeadRegion::face || region == HeadRegion::nose || region == HeadRegion::lips ||
+         region == HeadRegion::eyes;
+}
+
 Result<void> HeadTemplate::validate() const {
   const auto bad = [](std::string what) {
     return fail(ErrorKind::bad_input, "head template", std::move(what), "make it again");

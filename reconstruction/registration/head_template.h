@@ -24,6 +24,10 @@ inline constexpr int kHeadRegionCount = 7;
 
 std::string_view to_string(HeadRegion region);
 
+/// The face with nose, lips and eyes, by which fits and approximations are judged; not ears, scalp
+/// and neck.
+bool is_facial(HeadRegion region);
+
 /// A head's skin that can be deformed onto others, in the anatomical frame of the skull template
 /// [mm]; bald, lids and mouth closed, open at the neck. Gietzen et al. 2019: about 6,000 vertices.
 struct HeadTemplate {

@@ -29,11 +29,6 @@ constexpr std::array<std::pair<std::size_t, const char*>, 9> multi_pie_names = {
      {54, "cheilion left"}}};
 constexpr int pose_rounds = 3;
 
-bool is_of_face(HeadRegion region) {
-  return region == HeadRegion::face || region == HeadRegion::nose || region == HeadRegion::lips ||
-         region == HeadRegion::eyes;
-}
-
 /// Values at the corners of a place, weighted: 3 numbers a vertex.
 Eigen::Vector3d at_place(const SurfacePoint& place, const Eigen::VectorXd& of_vertices) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -86,7 +81,7 @@ Result<ImportedHead> import_head(const FaceModel& base, const StatismoModel& for
     const auto at = static_cast<std::size_t>(v);
     imported.places.push_back(surface.nearest(fit->vertices.row(v)));
     on_mean.row(v) = imported.places[at].position(mean.vertices);
-    of_face[v] = is_of_face(base.head_template.region[at]) ? 1.0 : 0.0;
+    of_face[v] = is_facial(base.head_template.region[at]) ? 1.0 : 0.0;
   }
   const auto pose = fit_similarity(on_mean, unflattened(base.head.mean), of_face, FitScale::one);
   if (!pose) return forward(pose);

@@ -28,18 +28,6 @@ std::vector<Index> sampled_vertices(const Eigen::VectorXd& weights) {
   return sample;
 }
 
-double tissue_error_mm(const TissueModel& tissue, const Eigen::VectorXd& predicted_mm,
-                       const Eigen::VectorXd& truth_mm) {
-  double sum = 0.0;
-  double count = 0.0;
-  for (Index v = 0; v < truth_mm.size(); ++v) {
-    if (!tissue.modelled[static_cast<std::size_t>(v)] || std::isnan(truth_mm[v])) continue;
-    sum += std::abs(predicted_mm[v] - truth_mm[v]);
-    ++count;
-  }
-  return sum / std::max(1.0, count);
-}
-
 /// Signed distance of the predicted from the true vertices along the true normals.
 Eigen::VectorXd along_normals(const Points3& predicted, const Points3& truth,
                               const Points3& normals) {
@@ -98,7 +86,7 @@ Result<std::vector<LeftOut>> leave_one_out(const SkullTemplate& skull, const Hea
       return ForetoldErrors{
           along_normals(shape_at(*head_model, of_head.mean), heads[n], normals),
           sd_along_normals_mm(*head_model, of_head.covariance, normals),
-          tissue_error_mm(tissue, expected_tissue(tissue, of_tissue), subjects[n].tissue_mm)};
+          mean_depth_error_mm(tissue, expected_tissue(tissue, of_tissue), subjects[n].tissue_mm)};
     };
     const Eigen::VectorXd coefficients = coefficients_of(*skull_model, skulls[n]);
     const Belief skull_belief{coefficients,
@@ -116,6 +104,17 @@ Result<std::vector<LeftOut>> leave_one_out(const SkullTemplate& skull, const Hea
     results.push_back(std::move(left));
   }
   return results;
+}
+
+double mean_facial_error_mm(const HeadTemplate& head, const Eigen::VectorXd& errors_mm) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (Index v = 0; v < errors_mm.size(); ++v) {
+    if (!is_facial(head.region[static_cast<std::size_t>(v)])) continue;
+    sum += std::abs(errors_mm[v]);
+    ++count;
+  }
+  return sum / std::max(1.0, count);
 }
 
 std::vector<BandFactor> calibrated_bands(const HeadTemplate& head,

@@ -35,6 +35,9 @@ Result<std::vector<LeftOut>> leave_one_out(const SkullTemplate& skull, const Hea
                                            const JointScoreOptions& options = {},
                                            const Progress& progress = {});
 
+/// Mean absolute error over the facial vertices; `errors_mm` are those of all head vertices.
+double mean_facial_error_mm(const HeadTemplate& head, const Eigen::VectorXd& errors_mm);
+
 /// 80 % bands by region of the head (all of a region's vertices and subjects together), and for
 /// "all".
 std::vector<BandFactor> calibrated_bands(const HeadTemplate& head,

@@ -408,6 +408,18 @@ Eigen::VectorXd expected_tissue(const TissueModel& model, const Belief& belief) 
   return where_modelled(model, (log_depth + 0.5 * log_variance(model, belief)).array().exp());
 }
 
+double mean_depth_error_mm(const TissueModel& model, const Eigen::VectorXd& foretold_mm,
+                           const Eigen::VectorXd& truth_mm) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (Index v = 0; v < truth_mm.size(); ++v) {
+    if (!model.modelled[static_cast<std::size_t>(v)] || std::isnan(truth_mm[v])) continue;
+    sum += std::abs(foretold_mm[v] - truth_mm[v]);
+    ++count;
+  }
+  return sum / std::max(1.0, count);
+}
+
 Eigen::VectorXd tissue_sd_mm(const TissueModel& model, const Belief& belief) {
   const Eigen::ArrayXd variance = log_variance(model, belief).array();
   return where_modelled(model,

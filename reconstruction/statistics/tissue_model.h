@@ -60,6 +60,11 @@ Belief tissue_belief(const TissueModel& model, const Eigen::VectorXd& depths_mm)
 Eigen::VectorXd tissue_at(const TissueModel& model, const Eigen::VectorXd& coefficients);
 Eigen::VectorXd expected_tissue(const TissueModel& model, const Belief& belief);
 
+/// Mean absolute error of foretold depths [mm], where the model and the truth (#V, NaN: not
+/// measured) have any.
+double mean_depth_error_mm(const TissueModel& model, const Eigen::VectorXd& foretold_mm,
+                           const Eigen::VectorXd& truth_mm);
+
 /// Standard deviation of the depths (#V [mm], NaN where not modelled) under a belief, the noise
 /// included.
 Eigen::VectorXd tissue_sd_mm(const TissueModel& model, const Belief& belief);
