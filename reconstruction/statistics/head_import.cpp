@@ -27,7 +27,6 @@ constexpr std::array<std::pair<std::size_t, const char*>, 9> multi_pie_names = {
      {45, "exocanthion left"},
      {48, "cheilion right"},
      {54, "cheilion left"}}};
-constexpr int pose_rounds = 3;
 
 /// Values at the corners of a place, weighted: 3 numbers a vertex.
 Eigen::Vector3d at_place(const SurfacePoint& place, const Eigen::VectorXd& of_vertices) {
@@ -47,6 +46,7 @@ Result<std::vector<VertexLandmark>> multi_pie_landmarks(const std::vector<int>& 
         fmt::format("{} vertices are not the {} of Multi-PIE", vertices.size(), multi_pie_count));
   }
   std::vector<VertexLandmark> landmarks;
+  landmarks.reserve(std::size(multi_pie_names));
   for (const auto& [index, name] : multi_pie_names) landmarks.push_back({name, vertices[index]});
   return landmarks;
 }

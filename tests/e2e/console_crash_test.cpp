@@ -22,6 +22,7 @@
 #include "daemon/database/database.h"
 #include "daemon/evidence/audit_check.h"
 #include "daemon/http/approvals.h"
+#include "tests/e2e/console_examiner.h"
 #include "tests/e2e/small_station.h"
 #include "tests/support/console_user.h"
 #include "tests/support/process.h"
@@ -35,8 +36,9 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using nlohmann::json;
+using skullstation::testing::Acknowledged;
 using skullstation::testing::comes_true;
-using skullstation::testing::ConsoleUser;
+using skullstation::testing::Examiner;
 using skullstation::testing::HttpsAnswer;
 using skullstation::testing::Medium;
 using skullstation::testing::Process;
@@ -51,155 +53,6 @@ bool long_form() {
   const char* wish = std::getenv("SKULLSTATION_LONG");
   return wish != nullptr && std::string(wish) == "1";
 }
-
-/// What the console has told so far.
-struct Acknowledged {
-  std::map<std::int64_t, std::string> saved;    // case to its number
-  std::map<std::int64_t, std::size_t> views;    // case to how many pictures it had
-  std::map<std::int64_t, json> artifacts;       // job to its files
-  std::map<std::int64_t, std::int64_t> reruns;  // job to its case
-  std::map<std::int64_t, std::string> holds;    // case to the reason, if nobody knows better
-  std::set<std::int64_t> approved;              // jobs
-  std::map<std::string, std::size_t> audit;     // how often something was done
-};
-
-/// Does at the console what comes to mind and remembers what was acknowledged.
-class Examiner {
- public:
-  explicit Examiner(std::size_t cases_wanted) : cases_wanted_(cases_wanted) {}
-
-  bool connect(std::uint16_t port) { return user_.connect(port); }
-  bool sign_in(const std::string& path, const json& body) { return user_.sign_in(path, body); }
-  HttpsAnswer ask(const std::string& method, const std::string& path, const json& body = nullptr) {
-    const HttpsAnswer answer = user_.ask(method, path, body);
-    if (answer.status == 0) gone_ = true;
-    return answer;
-  }
-
-  /// False when nobody answers any more.
-  bool act() {
-    gone_ = false;
-    at_the_table();
-    if (!gone_) with_a_case();
-    std::this_thread::sleep_for(std::chrono::milliseconds(random_.below(40)));
-    return !gone_;
-  }
-  const Acknowledged& told() const { return told_; }
-  /// As far as is known every case that was wanted came to its end.
-  bool all_ended() const { return all_ended_; }
-
- private:
-  json get(const std::string& path) {
-    const HttpsAnswer answer = ask("GET", path);
-    return answer.status == 200 ? json::parse(answer.body) : json();
-  }
-  bool change(const std::string& method, const std::string& path, const char* audit,
-              const json& body = nullptr) {
-    const int status = ask(method, path, body).status;
-    if (status >= 200 && status < 300) ++told_.audit[audit];
-    return status >= 200 && status < 300;
-  }
-
-  void at_the_table() {
-    const json station = get("/station");
-    if (station.is_null()) return;
-    const std::string state = station["state"];
-    if (state == "scanning") {
-      const json scan = get("/station/scan");
-      if (!scan.is_null()) {
-        std::size_t& views = told_.views[scan["case"].get<std::int64_t>()];
-        views = std::max(views, scan["views"].size());
-      }
-    } else if (state == "turn-over") {
-      change("POST", "/station/confirm", "confirm placement");
-    } else if (state == "fault") {
-      change("POST", "/station/reset", "reset station");
-    } else if (state != "starting" && standing_ < cases_wanted_ && waiting_ < 3) {
-      const std::string number = fmt::format("case-{}", started_);
-      if (change("POST", "/station/start", "start scan", {{"case_number", number}})) ++started_;
-    }
-  }
-
-  void with_a_case() {
-    const json all = get("/cases?most=200");
-    if (all.is_null()) return;
-    waiting_ = 0;
-    standing_ = 0;
-    all_ended_ = true;
-    std::vector<json> saved;
-    for (const json& row : all["cases"]) {
-      const std::string state = row["state"];
-      // A scan that was killed before its first picture is cancelled; another one takes its place.
-      if (state != "cancelled") ++standing_;
-      if (state != "done" && state != "cancelled") all_ended_ = false;
-      if (state == "scanning" || state == "cancelled") continue;
-      if (state == "building") ++waiting_;
-      told_.saved[row["id"].get<std::int64_t>()] = row["number"];
-      saved.push_back(row);
-    }
-    all_ended_ = all_ended_ && standing_ >= cases_wanted_;
-    if (saved.empty()) return;
-    const json shown =
-        get(fmt::format("/cases/{}", saved[random_.below(saved.size())]["id"].get<std::int64_t>()));
-    if (shown.is_null()) return;
-    for (const json& job : shown["jobs"]) look_at(job);
-    do_something_with(shown);
-  }
-
-  void look_at(const json& job) {
-    const std::int64_t id = job["id"];
-    if (job["state"] == "failed") change("POST", fmt::format("/jobs/{}/retry", id), "retry job");
-    if (job["state"] != "done" || told_.artifacts.contains(id)) return;
-    const json files = get(fmt::format("/jobs/{}/files", id));
-    if (!files.is_null()) told_.artifacts[id] = files["files"];
-  }
-
-  void do_something_with(const json& shown) {
-    const std::int64_t id = shown["id"];
-    const std::string path = fmt::format("/cases/{}", id);
-    std::int64_t result = 0;
-    for (const json& job : shown["jobs"]) {
-      if (job["step"] == "approximate") result = job["id"];
-    }
-    switch (random_.below(6)) {
-      case 0: {
-        told_.holds.erase(id);  // without an answer nobody knows
-        const std::string reason = fmt::format("reason {}", random_.below(1000));
-        if (change("PUT", path + "/hold", "hold case", {{"reason", reason}})) {
-          told_.holds[id] = reason;
-        }
-        return;
-      }
-      case 1:
-        if (change("POST", path + "/approval", "approve case", {{"job", result}})) {
-          told_.approved.insert(result);
-        }
-        return;
-      case 2: {
-        if (shown["state"] != "done" || told_.reruns.size() >= told_.saved.size()) return;
-        const HttpsAnswer answer =
-            ask("POST", path + "/rerun",
-                {{"step", "approximate"}, {"options", {{"mark", fmt::to_string(result)}}}});
-        if (answer.status == 201) {
-          told_.reruns[json::parse(answer.body)["job"].get<std::int64_t>()] = id;
-          ++told_.audit["rerun step"];
-        }
-        return;
-      }
-      default: return;
-    }
-  }
-
-  ConsoleUser user_;
-  Random random_{20260131};
-  const std::size_t cases_wanted_;
-  Acknowledged told_;
-  std::size_t started_ = 0;
-  std::size_t standing_ = 0;  ///< cases that were not cancelled
-  std::size_t waiting_ = 0;
-  bool all_ended_ = false;
-  bool gone_ = false;
-};
 
 /// The daemon, its folders, and what must be true of them.
 class StationAtWork {

@@ -1,5 +1,7 @@
 #include "tests/servers/servers.h"
 
+#include <sys/mount.h>
+
 #include <sys/stat.h>
 
 #include "core/file.h"
@@ -31,6 +33,23 @@ void Servers::need(const std::vector<std::string>& programs) {
       GTEST_SKIP() << program << " is not installed (tests/servers/packages.txt)";
     }
   }
+}
+
+Servers::SmallDisks::~SmallDisks() {
+  // Detached: a server may still be about to end.
+  for (const fs::path& disk : mounted) ::umount2(disk.c_str(), MNT_DETACH);
+}
+
+bool Servers::make_small_disk(const std::string& name, const std::string& size) {
+  const fs::path disk = make(name);
+  const auto mount = [&] {
+    if (::mount("none", disk.c_str(), "tmpfs", 0, ("size=" + size).c_str()) != 0) {
+      GTEST_SKIP() << "nothing can be mounted here";
+    }
+    small_disks_.mounted.push_back(disk);
+  };
+  mount();
+  return !small_disks_.mounted.empty();
 }
 
 const SealedPackage& Servers::package() {

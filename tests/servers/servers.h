@@ -34,6 +34,9 @@ class Servers : public ::testing::Test {
   std::string probe(const TargetConfig& target, bool removed);
 
   std::filesystem::path make(const std::string& name);
+  /// A folder on a file system of its own that is soon full ("256k"), until the end of the test.
+  /// Skips, and is false, where nothing can be mounted.
+  bool make_small_disk(const std::string& name, const std::string& size);
   /// A file that holds a secret as the station wants it.
   std::string secret(const std::string& text);
   static TargetConfig target(DeliveryProtocol protocol, const std::string& address);
@@ -47,6 +50,13 @@ class Servers : public ::testing::Test {
   void survives_cuts(const TargetConfig& config, int from, int to, std::size_t most);
 
   TemporaryFolder folder_;
+
+ private:
+  /// Destroyed before the folder in which they lie.
+  struct SmallDisks {
+    std::vector<std::filesystem::path> mounted;
+    ~SmallDisks();
+  } small_disks_;
 };
 
 }  // namespace skullstation::testing

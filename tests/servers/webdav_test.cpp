@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/mount.h>
 
 #include "tests/servers/servers.h"
 #include "tests/unit/evidence/small_case.h"
@@ -70,15 +69,10 @@ TEST_F(Webdav, CutConnectionsLoseAndDoubleNothing) {
 }
 
 TEST_F(Webdav, AFullDiskWaits) {
-  if (::mount("none", (folder_ / "dav").c_str(), "tmpfs", 0, "size=256k") != 0) {
-    GTEST_SKIP() << "nothing can be mounted here";
-  }
+  if (!make_small_disk("dav", "256k")) return;
   make("dav/in");
-  {
-    const auto server = start_nginx(folder_.path(), folder_ / "dav");
-    EXPECT_THAT(fails(nginx(), ErrorKind::hardware), HasSubstr("HTTP 50"));
-  }
-  ::umount2((folder_ / "dav").c_str(), MNT_DETACH);
+  const auto server = start_nginx(folder_.path(), folder_ / "dav");
+  EXPECT_THAT(fails(nginx(), ErrorKind::hardware), HasSubstr("HTTP 50"));
 }
 
 TEST_F(Webdav, ApacheHoldsThePackageOnceThoughSentThreeTimes) {
@@ -129,17 +123,12 @@ TEST_F(Webdav, ConnectionsToApacheThatAreCutLoseAndDoubleNothing) {
 TEST_F(Webdav, AFullDiskOfApacheWaits) {
   need({"/usr/sbin/apache2"});
   if (IsSkipped()) return;
-  if (::mount("none", (folder_ / "dav").c_str(), "tmpfs", 0, "size=256k") != 0) {
-    GTEST_SKIP() << "nothing can be mounted here";
-  }
+  if (!make_small_disk("dav", "256k")) return;
   make("dav/in");
-  {
-    const auto server = start_apache(folder_.path(), folder_ / "dav");
-    TargetConfig config = nginx();
-    config.address = "https://localhost:18445/in";
-    EXPECT_NE(fails(config, ErrorKind::hardware), "it was delivered");
-  }
-  ::umount2((folder_ / "dav").c_str(), MNT_DETACH);
+  const auto server = start_apache(folder_.path(), folder_ / "dav");
+  TargetConfig config = nginx();
+  config.address = "https://localhost:18445/in";
+  EXPECT_NE(fails(config, ErrorKind::hardware), "it was delivered");
 }
 
 }  // namespace
