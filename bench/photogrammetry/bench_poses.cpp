@@ -1,16 +1,19 @@
 // Poses and masks of sessions whose truth is known: how far off, how fast.
-//   bench_poses [--masks DIR] SESSION ...   writes every eighth mask to DIR; SESSION: folders as
-//   `skullstation scan` makes them on the simulated station
-//                               (simulation_truth.json), or with true poses and masks in
-//                               session.json
+//   bench_poses [--masks DIR] [--sfm RADIUS_MM] SESSION ...
+// SESSION: folders as `skullstation scan` makes them on the simulated station
+// (simulation_truth.json), or with true poses and masks in session.json. --masks writes every
+// eighth mask to DIR. --sfm forgets the board and the poses: structure from motion, its scale from
+// the table's angles and the first camera's distance from the axis.
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "bench/seconds.h"
 #include "core/file.h"
@@ -162,7 +165,8 @@ void print_masks(const Session& session, const fs::path& folder, const fs::path&
   }
 }
 
-int run_session(const fs::path& folder, const fs::path& masks_folder) {
+int run_session(const fs::path& folder, const fs::path& masks_folder,
+                std::optional<double> sfm_radius_mm) {
   Result<Session> session = read_session(folder);
   if (!session) {
     fmt::print(stderr, "{}\n", session.error().message());
@@ -177,9 +181,16 @@ int run_session(const fs::path& folder, const fs::path& masks_folder) {
   const std::vector<Rigid3> truth = true_poses(*session, folder);
   fmt::print("{}: {} views\n  reading: {}\n", folder.string(), session->views.size(), watch.look());
   for (SessionView& view : session->views) view.camera_from_table.reset();
+  PoseOptions options;
+  if (sfm_radius_mm) {
+    session->board.reset();
+    for (SessionCamera& camera : session->cameras) camera.refine = false;
+    options.method = PoseMethod::motion;
+    options.motion.camera_radius_mm = sfm_radius_mm;
+  }
   const auto observations = pose_observations(*session, *photographs, 0);
   fmt::print("  board corners: {}\n", watch.look());
-  const auto found = find_poses(*session, *photographs, observations, {});
+  const auto found = find_poses(*session, *photographs, observations, options);
   if (!found) {
     fmt::print("  poses: {}\n", found.error().message());
     return 1;
@@ -208,13 +219,16 @@ int run_session(const fs::path& folder, const fs::path& masks_folder) {
 
 int main(int argc, char** argv) {
   int failed = 0;
-  fs::path masks_folder;
-  for (int i = 1; i < argc; ++i) {
-    if (argv[i] == std::string_view("--masks") && i + 1 < argc) {
-      masks_folder = argv[++i];
-    } else {
-      failed += run_session(argv[i], masks_folder);
-    }
+  std::string masks_folder;
+  std::optional<double> sfm_radius_mm;
+  std::vector<std::string> sessions;
+  CLI::App app{"poses and masks of sessions whose truth is known"};
+  app.add_option("--masks", masks_folder, "writes every eighth mask there");
+  app.add_option("--sfm", sfm_radius_mm, "without board: the first camera's radius [mm]");
+  app.add_option("sessions", sessions)->required();
+  CLI11_PARSE(app, argc, argv);
+  for (const std::string& session : sessions) {
+    failed += run_session(session, masks_folder, sfm_radius_mm);
   }
   return failed == 0 ? 0 : 1;
 }

@@ -8,9 +8,21 @@ namespace skullstation {
 
 bool solve_bundle(ceres::Problem& problem, BundleShape shape) {
   ceres::Solver::Options options;
-  options.linear_solver_type =
-      shape == BundleShape::few_unknowns ? ceres::DENSE_SCHUR : ceres::SPARSE_NORMAL_CHOLESKY;
-  const double tolerance = shape == BundleShape::few_unknowns ? 1e-12 : 1e-10;
+  double tolerance = 0.0;
+  switch (shape) {
+    case BundleShape::few_unknowns:
+      options.linear_solver_type = ceres::DENSE_SCHUR;
+      tolerance = 1e-12;
+      break;
+    case BundleShape::many_views:
+      options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+      tolerance = 1e-10;
+      break;
+    case BundleShape::many_points:
+      options.linear_solver_type = ceres::SPARSE_SCHUR;
+      tolerance = 1e-6;
+      break;
+  }
   options.max_num_iterations = 200;
   options.function_tolerance = tolerance;
   options.parameter_tolerance = tolerance;

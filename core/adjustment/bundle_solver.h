@@ -9,8 +9,9 @@ class Problem;
 
 namespace skullstation {
 
-/// How the normal equations are solved: many blocks that see few others are sparse.
-enum class BundleShape { few_unknowns, many_views };
+/// How the normal equations are solved: many blocks that see few others are sparse, points that
+/// share no residual are eliminated first.
+enum class BundleShape { few_unknowns, many_views, many_points };
 
 /// Solves the problem to convergence on one thread, so that the result is the same everywhere.
 /// False if no usable solution was found.

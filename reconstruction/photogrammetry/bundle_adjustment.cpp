@@ -18,6 +18,7 @@ namespace {
 template <class T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
 
+/// Of a known point.
 struct CornerResidual {
   Eigen::Vector3d x_board;
   Eigen::Vector2d observed_px;
@@ -27,6 +28,23 @@ struct CornerResidual {
   bool operator()(const T* intrinsics, const T* rotation, const T* translation, T* residual) const {
     const Vector3<T> x = transformed<T>(rotation, translation, x_board.cast<T>());
     const Eigen::Matrix<T, 2, 1> px = project_opencv<T>(intrinsics, x);
+    residual[0] = (px.x() - observed_px.x()) / sd_px;
+    residual[1] = (px.y() - observed_px.y()) / sd_px;
+    return true;
+  }
+};
+
+/// Of a point that is itself unknown.
+struct SightResidual {
+  Eigen::Vector2d observed_px;
+  double sd_px;
+
+  template <class T>
+  bool operator()(const T* intrinsics, const T* rotation, const T* translation, const T* point,
+                  T* residual) const {
+    const Eigen::Map<const Vector3<T>> x(point);
+    const Eigen::Matrix<T, 2, 1> px =
+        project_opencv<T>(intrinsics, transformed<T>(rotation, translation, x));
     residual[0] = (px.x() - observed_px.x()) / sd_px;
     residual[1] = (px.y() - observed_px.y()) / sd_px;
     return true;
@@ -63,6 +81,24 @@ struct RingResidual {
           ring_rotation, ring_translation, turned<T>(*angle_rad, board_point_on_table<T>(axis, x)));
       Eigen::Map<Vector3<T>>(residual + 3 * i) =
           (transformed<T>(rotation, translation, x) - by_ring) / T(sd_mm);
+    }
+    return true;
+  }
+};
+
+/// Displacement of the reach points from where they were.
+struct PlaceResidual {
+  std::array<Eigen::Vector3d, 4> points;
+  Rigid3 place;
+  double sd_mm;
+
+  template <class T>
+  bool operator()(const T* rotation, const T* translation, T* residual) const {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector3d before = place * points[i];
+      Eigen::Map<Vector3<T>>(residual + 3 * i) =
+          (transformed<T>(rotation, translation, points[i].cast<T>()) - before.cast<T>()) /
+          T(sd_mm);
     }
     return true;
   }
@@ -110,7 +146,26 @@ class CeresBundle {
     for (BundleView& view : problem_.views) make_rotation(view.camera_from_board);
   }
 
+  void add_sights() {
+    for (BundleView& view : problem_.views) {
+      double* const lens = intrinsics_[static_cast<std::size_t>(view.lens)].data();
+      for (const BundleSight& sight : view.sights) {
+        ceres_.AddResidualBlock(new ceres::AutoDiffCostFunction<SightResidual, 2, 8, 4, 3, 3>(
+                                    new SightResidual{sight.position_px, problem_.sight_sd_px}),
+                                new ceres::HuberLoss(problem_.huber_sds), lens,
+                                rotation(view.camera_from_board),
+                                translation(view.camera_from_board),
+                                problem_.points[static_cast<std::size_t>(sight.point)].data());
+      }
+      if (!view.sights.empty()) {
+        ceres_.SetParameterBlockConstant(lens);
+        make_rotation(view.camera_from_board);
+      }
+    }
+  }
+
   /// \pre trust.departure_mm > 0
+  template <class Loss>
   void add_rings(const TableTrust& trust, double loss_sds) {
     for (BundleView& view : problem_.views) {
       if (view.ring < 0) continue;
@@ -119,13 +174,13 @@ class CeresBundle {
       ceres_.AddResidualBlock(
           new ceres::AutoDiffCostFunction<RingResidual, 12, 4, 1, 4, 3, 4, 3>(
               new RingResidual{reach_points(trust.reach_mm), trust.departure_mm / ring_weight}),
-          new ceres::HuberLoss(loss_sds), axis.unknowns.data(), &view.angle_rad,
+          new Loss(loss_sds), axis.unknowns.data(), &view.angle_rad,
           rotation(ring.camera_from_station), translation(ring.camera_from_station),
           rotation(view.camera_from_board), translation(view.camera_from_board));
       ceres_.AddResidualBlock(
           new ceres::AutoDiffCostFunction<AngleResidual, 1, 1>(
               new AngleResidual{view.commanded_rad, radians(trust.angle_sd_deg)}),
-          new ceres::HuberLoss(loss_sds), &view.angle_rad);
+          new Loss(loss_sds), &view.angle_rad);
     }
     for (const BundleView& view : problem_.views) {
       if (view.ring < 0) continue;
@@ -142,7 +197,18 @@ class CeresBundle {
     }
   }
 
-  bool solve() { return solve_bundle(ceres_, BundleShape::many_views); }
+  /// What no photograph tells (place, direction and unit of the whole) stays about as it is: the
+  /// axes do, and the first ring's camera hangs on a soft spring.
+  void hold_frame(double reach_mm) {
+    constexpr double spring_mm = 1.0;
+    for (TableAxis& axis : problem_.axes) ceres_.SetParameterBlockConstant(axis.unknowns.data());
+    Rigid3& ring = problem_.rings.front().camera_from_station;
+    ceres_.AddResidualBlock(new ceres::AutoDiffCostFunction<PlaceResidual, 12, 4, 3>(
+                                new PlaceResidual{reach_points(reach_mm), ring, spring_mm}),
+                            nullptr, rotation(ring), translation(ring));
+  }
+
+  bool solve(BundleShape shape = BundleShape::many_views) { return solve_bundle(ceres_, shape); }
 
   void finish() {
     for (std::size_t i = 0; i < intrinsics_.size(); ++i) {
@@ -153,6 +219,7 @@ class CeresBundle {
   }
 
   std::optional<BundleCovariance> covariance();
+  std::vector<Eigen::Matrix<double, 6, 6>> covariance_by_points(double reach_mm);
 
  private:
   static double* rotation(Rigid3& pose) { return pose.rotation.coeffs().data(); }
@@ -246,6 +313,70 @@ std::optional<BundleCovariance> CeresBundle::covariance() {
   return result;
 }
 
+/// The columns of a row of the Jacobian are those of one view, then those of one point.
+std::vector<Eigen::Matrix<double, 6, 6>> CeresBundle::covariance_by_points(double reach_mm) {
+  ceres::Problem::EvaluateOptions options;
+  for (BundleView& view : problem_.views) {
+    if (view.sights.empty()) return {};
+    options.parameter_blocks.push_back(rotation(view.camera_from_board));
+    options.parameter_blocks.push_back(translation(view.camera_from_board));
+  }
+  for (Eigen::Vector3d& point : problem_.points) {
+    if (!ceres_.HasParameterBlock(point.data())) return {};
+    options.parameter_blocks.push_back(point.data());
+  }
+  ceres::CRSMatrix jacobian;
+  if (!ceres_.Evaluate(options, nullptr, nullptr, nullptr, &jacobian)) return {};
+
+  using PointRow = Eigen::RowVector3d;
+  using ViewRow = Eigen::Matrix<double, 1, 6>;
+  const auto views = static_cast<Eigen::Index>(problem_.views.size());
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(6 * views, 6 * views);
+  std::vector<Eigen::Matrix3d> of_point(problem_.points.size(), Eigen::Matrix3d::Zero());
+  std::vector<std::map<int, Eigen::Matrix<double, 6, 3>>> shared(problem_.points.size());
+  for (int row = 0; row < jacobian.num_rows; ++row) {
+    const auto begin = static_cast<std::size_t>(jacobian.rows[static_cast<std::size_t>(row)]);
+    const int first = jacobian.cols[begin];
+    const auto point = static_cast<std::size_t>((jacobian.cols[begin + 6] - 6 * views) / 3);
+    // Ceres's tangent of a quaternion is half the rotation vector; in units of length it weighs
+    // as much as the shift.
+    ViewRow by_view = Eigen::Map<const ViewRow>(jacobian.values.data() + begin);
+    by_view.head<3>() /= 2.0 * reach_mm;
+    const PointRow by_point = Eigen::Map<const PointRow>(jacobian.values.data() + begin + 6);
+    normal.block<6, 6>(first, first) += by_view.transpose() * by_view;
+    of_point[point] += by_point.transpose() * by_point;
+    const auto [entry, added] =
+        shared[point].try_emplace(first, Eigen::Matrix<double, 6, 3>::Zero());
+    entry->second += by_view.transpose() * by_point;
+  }
+  for (std::size_t point = 0; point < shared.size(); ++point) {
+    const Eigen::Matrix3d inverse = of_point[point].inverse();
+    if (!inverse.allFinite()) return {};
+    for (const auto& [i, of_i] : shared[point]) {
+      const Eigen::Matrix<double, 6, 3> weighted = of_i * inverse;
+      for (const auto& [j, of_j] : shared[point]) {
+        normal.block<6, 6>(i, j) -= weighted * of_j.transpose();
+      }
+    }
+  }
+  constexpr Eigen::Index untold = 7;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
+  if (eigen.info() != Eigen::Success || normal.rows() <= untold) return {};
+  const Eigen::VectorXd told = eigen.eigenvalues().tail(normal.rows() - untold);
+  if (!(told.minCoeff() > 0.0)) return {};
+  const Eigen::MatrixXd directions = eigen.eigenvectors().rightCols(told.size());
+  const Eigen::MatrixXd inverse =
+      directions * told.cwiseInverse().asDiagonal() * directions.transpose();
+  std::vector<Eigen::Matrix<double, 6, 6>> result;
+  for (Eigen::Index view = 0; view < views; ++view) {
+    Eigen::Matrix<double, 6, 6> motion = inverse.block<6, 6>(6 * view, 6 * view);
+    motion.topRows<3>() /= reach_mm;
+    motion.leftCols<3>() /= reach_mm;
+    result.push_back(motion);
+  }
+  return result;
+}
+
 }  // namespace
 
 std::array<Eigen::Vector3d, 4> reach_points(double reach_mm) {
@@ -272,10 +403,26 @@ bool adjust_views(BundleProblem& problem, const CharucoBoard& board,
                   const std::optional<TableTrust>& trust) {
   CeresBundle bundle(problem);
   bundle.add_corners(board);
-  if (trust) bundle.add_rings(*trust, 3.0 * std::sqrt(6.0));
+  if (trust) bundle.add_rings<ceres::HuberLoss>(*trust, 3.0 * std::sqrt(6.0));
   if (!bundle.solve()) return false;
   bundle.finish();
   return true;
+}
+
+bool adjust_views_by_points(BundleProblem& problem, const TableTrust& trust) {
+  CeresBundle bundle(problem);
+  bundle.add_sights();
+  // A camera that was knocked is to lose touch with its ring.
+  bundle.add_rings<ceres::CauchyLoss>(trust, 3.0);
+  bundle.hold_frame(trust.reach_mm);
+  return bundle.solve(BundleShape::many_points);
+}
+
+std::vector<Eigen::Matrix<double, 6, 6>> covariance_by_points(BundleProblem& problem,
+                                                              double reach_mm) {
+  CeresBundle bundle(problem);
+  bundle.add_sights();
+  return bundle.covariance_by_points(reach_mm);
 }
 
 bool adjust_rings(BundleProblem& problem, double reach_mm, double loss_mm) {
@@ -285,7 +432,7 @@ bool adjust_rings(BundleProblem& problem, double reach_mm, double loss_mm) {
   // The commanded angles fix where the station's zero is, and no more than that.
   constexpr double angle_sd_deg = 5.0;
   CeresBundle bundle(problem);
-  bundle.add_rings({loss_mm, angle_sd_deg, reach_mm}, 1.0);
+  bundle.add_rings<ceres::HuberLoss>({loss_mm, angle_sd_deg, reach_mm}, 1.0);
   bundle.hold_views();
   return bundle.solve();
 }
@@ -294,7 +441,7 @@ std::optional<BundleCovariance> covariance_of(BundleProblem& problem, const Char
                                               const std::optional<TableTrust>& trust) {
   CeresBundle bundle(problem);
   bundle.add_corners(board);
-  if (trust) bundle.add_rings(*trust, 3.0 * std::sqrt(6.0));
+  if (trust) bundle.add_rings<ceres::HuberLoss>(*trust, 3.0 * std::sqrt(6.0));
   return bundle.covariance();
 }
 

@@ -20,13 +20,20 @@ struct BundleLens {
   double aspect_sd = 5e-4;     ///< of fx / fy, which no change of focus alters
 };
 
-/// One view of the board.
+/// Where a view shows one of `BundleProblem::points`.
+struct BundleSight {
+  int point = 0;
+  Eigen::Vector2d position_px;
+};
+
+/// One view of the board, of points of the specimen, or of both.
 struct BundleView {
   int lens = 0;
   int ring = -1;           ///< index of its BundleRing; -1: nothing is known about its place
   double angle_rad = 0.0;  ///< of the table: start value and result
   double commanded_rad = 0.0;
   std::vector<BoardCorner> corners;
+  std::vector<BundleSight> sights;
   Rigid3 camera_from_board;  ///< start value and result
 };
 
@@ -47,9 +54,11 @@ struct BundleProblem {
   std::vector<BundleLens> lenses;
   std::vector<BundleView> views;
   std::vector<BundleRing> rings;
-  std::vector<TableAxis> axes;  ///< one a pass
-  double corner_sd_px = 0.1;    ///< of one coordinate
-  double huber_sds = 3.0;       ///< errors beyond so many standard deviations count linearly
+  std::vector<TableAxis> axes;          ///< one a pass
+  std::vector<Eigen::Vector3d> points;  ///< of the specimen: start values and results
+  double corner_sd_px = 0.1;            ///< of one coordinate
+  double sight_sd_px = 0.5;             ///< of one coordinate
+  double huber_sds = 3.0;  ///< errors beyond so many standard deviations count linearly
 };
 
 /// Covariance of all unknowns that are free, from the normal equations.
@@ -67,6 +76,11 @@ struct BundleCovariance {
 bool adjust_views(BundleProblem& problem, const CharucoBoard& board,
                   const std::optional<TableTrust>& trust);
 
+/// Adjusts views and the specimen's points to where the views show them, lenses held, each view
+/// drawn to where its ring has it; rings and axes too. The same on any machine and for any number
+/// of threads: one is used. False if no usable solution was found.
+bool adjust_views_by_points(BundleProblem& problem, const TableTrust& trust);
+
 /// Adjusts rings, axes and angles to the views' poses as they are, with a robust loss of
 /// `loss_mm`. False if no usable solution was found.
 bool adjust_rings(BundleProblem& problem, double reach_mm, double loss_mm);
@@ -74,6 +88,12 @@ bool adjust_rings(BundleProblem& problem, double reach_mm, double loss_mm);
 /// Nothing where some unknown is not determined.
 std::optional<BundleCovariance> covariance_of(BundleProblem& problem, const CharucoBoard& board,
                                               const std::optional<TableTrust>& trust);
+
+/// Of each view's pose, as in BundleCovariance, from the points' sights alone, the points unknown:
+/// of the seven unknowns that no photograph tells (place, direction and unit of the whole) nothing
+/// is counted (free network; Triggs et al. 2000, section 9). Empty where more is not determined.
+std::vector<Eigen::Matrix<double, 6, 6>> covariance_by_points(BundleProblem& problem,
+                                                              double reach_mm);
 
 /// The points whose displacement measures a departure from a pure rotation (board frame).
 std::array<Eigen::Vector3d, 4> reach_points(double reach_mm);

@@ -266,49 +266,18 @@ Result<void> gate_views(Work& work, const CharucoBoard& board, const BoardPoseOp
   }
 }
 
-/// Displacement of the reach points that the errors of a view's pose stand for [mm].
-double pose_noise_mm(const BundleView& view, const Eigen::Matrix<double, 6, 6>& covariance,
-                     double reach_mm) {
-  double variance = 0.0;
-  for (const Eigen::Vector3d& point : reach_points(reach_mm)) {
-    const Eigen::Vector3d x = view.camera_from_board.rotation * point;
-    Eigen::Matrix<double, 3, 6> by_motion;
-    by_motion << 0.0, x.z(), -x.y(), 1.0, 0.0, 0.0,  //
-        -x.z(), 0.0, x.x(), 0.0, 1.0, 0.0,           //
-        x.y(), -x.x(), 0.0, 0.0, 0.0, 1.0;
-    variance += (by_motion * covariance * by_motion.transpose()).trace() / 4.0;
-  }
-  return std::sqrt(variance);
-}
-
-/// How far rings are to be believed: as far as the free poses keep to them, their noise taken out.
+/// How far rings are to be believed; nothing where the views' errors are not determined.
 std::optional<TableTrust> find_trust(Work& work, const CharucoBoard& board) {
   // The axis's bearings and the print are no better than this.
   constexpr double least_departure_mm = 0.01;
-  constexpr double least_angle_sd_deg = 0.02;
-  TableTrust trust;
+  constexpr double reach_mm = 120.0;
   // What is uncertain about a lens moves all views of a ring alike: that is no departure.
   BundleProblem with_fixed_lenses = work.bundle;
   for (BundleLens& lens : with_fixed_lenses.lenses) lens.sd.fill(0.0);
   const auto covariance = covariance_of(with_fixed_lenses, board, std::nullopt);
-  if (!covariance || !adjust_rings(work.bundle, trust.reach_mm, 1.0)) return std::nullopt;
+  if (!covariance || !adjust_rings(work.bundle, reach_mm, 1.0)) return std::nullopt;
   level_rings(work.bundle);
-  std::vector<double> departures;
-  std::vector<double> noise;
-  std::vector<double> angles_deg;
-  for (std::size_t i = 0; i < work.bundle.views.size(); ++i) {
-    const BundleView& view = work.bundle.views[i];
-    if (view.ring < 0) continue;
-    departures.push_back(ring_departure_mm(work.bundle, view, trust.reach_mm));
-    noise.push_back(pose_noise_mm(view, covariance->views[i], trust.reach_mm));
-    angles_deg.push_back(std::abs(degrees(view.angle_rad - view.commanded_rad)));
-  }
-  const double measured = median(std::move(departures));
-  const double by_noise = median(std::move(noise));
-  trust.departure_mm = std::sqrt(
-      std::max(least_departure_mm * least_departure_mm, measured * measured - by_noise * by_noise));
-  trust.angle_sd_deg = std::max(least_angle_sd_deg, 1.4826 * median(std::move(angles_deg)));
-  return trust;
+  return trust_in_rings(work.bundle, covariance->views, reach_mm, least_departure_mm);
 }
 
 void report_table(const Work& work, const std::vector<PoseObservation>& views,

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "core/median.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -38,6 +39,21 @@ double measured_turn_deg(const BundleProblem& problem, const Rigid3& table_from_
        (problem.views[to].camera_from_board * board_from_table))
           .rotation;
   return degrees(2.0 * std::atan2(turn.z(), turn.w()));
+}
+
+/// Displacement of the reach points that the errors of a view's pose stand for [mm].
+double pose_noise_mm(const BundleView& view, const Eigen::Matrix<double, 6, 6>& covariance,
+                     double reach_mm) {
+  double variance = 0.0;
+  for (const Eigen::Vector3d& point : reach_points(reach_mm)) {
+    const Eigen::Vector3d x = view.camera_from_board.rotation * point;
+    Eigen::Matrix<double, 3, 6> by_motion;
+    by_motion << 0.0, x.z(), -x.y(), 1.0, 0.0, 0.0,  //
+        -x.z(), 0.0, x.x(), 0.0, 1.0, 0.0,           //
+        x.y(), -x.x(), 0.0, 0.0, 0.0, 1.0;
+    variance += (by_motion * covariance * by_motion.transpose()).trace() / 4.0;
+  }
+  return std::sqrt(variance);
 }
 
 }  // namespace
@@ -109,6 +125,30 @@ void level_rings(BundleProblem& problem) {
       if (std::cmp_equal(view.ring, r)) view.angle_rad -= zero_rad;
     }
   }
+}
+
+TableTrust trust_in_rings(const BundleProblem& problem,
+                          const std::vector<Eigen::Matrix<double, 6, 6>>& covariances,
+                          double reach_mm, double least_departure_mm) {
+  constexpr double least_angle_sd_deg = 0.02;
+  std::vector<double> departures;
+  std::vector<double> noise;
+  std::vector<double> angles_deg;
+  for (std::size_t i = 0; i < problem.views.size(); ++i) {
+    const BundleView& view = problem.views[i];
+    if (view.ring < 0) continue;
+    departures.push_back(ring_departure_mm(problem, view, reach_mm));
+    noise.push_back(pose_noise_mm(view, covariances[i], reach_mm));
+    angles_deg.push_back(std::abs(degrees(view.angle_rad - view.commanded_rad)));
+  }
+  const double measured = median(std::move(departures));
+  const double by_noise = median(std::move(noise));
+  TableTrust trust;
+  trust.reach_mm = reach_mm;
+  trust.departure_mm = std::sqrt(
+      std::max(least_departure_mm * least_departure_mm, measured * measured - by_noise * by_noise));
+  trust.angle_sd_deg = std::max(least_angle_sd_deg, 1.4826 * median(std::move(angles_deg)));
+  return trust;
 }
 
 }  // namespace skullstation

@@ -24,4 +24,10 @@ std::vector<int> begin_rings(BundleProblem& problem, const std::vector<RingMembe
 /// is nil: single stops where the table slipped have no say in where zero is.
 void level_rings(BundleProblem& problem);
 
+/// How far rings are to be believed: as far as the free poses keep to them, their noise taken out.
+/// `covariances`: of each view's pose (see BundleCovariance).
+TableTrust trust_in_rings(const BundleProblem& problem,
+                          const std::vector<Eigen::Matrix<double, 6, 6>>& covariances,
+                          double reach_mm, double least_departure_mm);
+
 }  // namespace skullstation

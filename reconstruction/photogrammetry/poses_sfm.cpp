@@ -11,12 +11,11 @@
 #include "core/median.h"
 #include "core/parallel.h"
 #include "core/units.h"
-#include "reconstruction/photogrammetry/bundle_adjustment.h"
 #include "reconstruction/photogrammetry/colmap_model.h"
 #include "reconstruction/photogrammetry/masks_evidence.h"
 #include "reconstruction/photogrammetry/poses_pnp.h"
-#include "reconstruction/photogrammetry/poses_rings.h"
 #include "reconstruction/photogrammetry/sfm_frame.h"
+#include "reconstruction/photogrammetry/sfm_rings.h"
 
 namespace skullstation {
 
@@ -123,7 +122,7 @@ class MotionPoses {
     }
     gate_by_points(pass);
     place(pass);
-    return gate_by_rings(pass);
+    return use_rings(pass);
   }
 
   void finish_pass(const PassMotion& pass) {
@@ -182,6 +181,7 @@ class MotionPoses {
     const double limit = std::max(options_.always_good_rms_px, options_.times_median * typical);
     for (std::size_t i = 0; i < pass.views.size(); ++i) {
       ViewPose& view = view_of(pass, i);
+      if (!view.used()) continue;
       if (!pass.model.camera_from_model[i]) {
         view.dropped = "shows nothing that connects it to the other views";
       } else if (view.points < options_.least_points) {
@@ -233,51 +233,56 @@ class MotionPoses {
     if (cameras.size() >= 2) pass.frame_from_model = frame_of_cameras(cameras, unknown_distance);
   }
 
-  /// With table angles: finds the axis, drops views that are off their camera's circle, and makes
-  /// the axis the frame's z where the frame is not a given one.
-  Result<void> gate_by_rings(PassMotion& pass) {
-    BundleProblem problem;
-    std::vector<RingMembership> members;
-    std::vector<std::size_t> of_pass;
+  RingMembers members_of(const PassMotion& pass) const {
+    RingMembers members(pass.views.size());
     for (std::size_t i = 0; i < pass.views.size(); ++i) {
       const PoseObservation& view = views_[pass.views[i]];
       if (!usable(pass, i) || !view.table_angle_deg) continue;
-      BundleView& added = problem.views.emplace_back();
-      added.camera_from_board =
-          in_reference(*pass.model.camera_from_model[i], pass.frame_from_model);
-      members.push_back({view.camera, view.pass, view.table_angle_deg});
-      of_pass.push_back(i);
+      members[i] = {view.camera, view.pass, view.table_angle_deg};
     }
-    const bool found = !begin_rings(problem, members).empty();
-    constexpr double reach_mm = 120.0;
-    constexpr double loss_mm = 1.0;
-    if (!found || !adjust_rings(problem, reach_mm, loss_mm)) {
+    return members;
+  }
+
+  /// With table angles: adjusts views to what they show and to their circles, drops those that are
+  /// off their circle all the same, and makes the axis the frame's z where the frame is not a given
+  /// one.
+  Result<void> use_rings(PassMotion& pass) {
+    adjust_to_rings(pass.model, pass.frame_from_model, members_of(pass));
+    gate_by_points(pass);
+    if (pass.scale != ScaleSource::unknown) place(pass);
+    auto rings = find_sfm_rings(pass.model, pass.frame_from_model, members_of(pass));
+    if (rings && drop_departures(pass, *rings)) {
+      rings = find_sfm_rings(pass.model, pass.frame_from_model, members_of(pass));
+    }
+    if (!rings) {
       if (pass.scale != ScaleSource::unknown || !options_.camera_radius_mm) return {};
       return fail(ErrorKind::no_result, subject,
                   "no axis is found, so that the camera's distance from it tells no scale",
                   "give the views their table_angle_deg, or lay a board under the specimen");
     }
-    level_rings(problem);
-    std::vector<double> departures;
-    for (const BundleView& view : problem.views) {
-      departures.push_back(view.ring < 0 ? 0.0 : ring_departure_mm(problem, view, reach_mm));
-    }
-    const double typical = median(departures);
-    for (std::size_t k = 0; k < problem.views.size(); ++k) {
-      const double distance = problem.views[k].camera_from_board.translation.norm();
-      const double limit = std::max(options_.always_good_departure * distance,
-                                    options_.times_median_departure * typical);
-      if (departures[k] <= limit) continue;
-      view_of(pass, of_pass[k]).dropped = fmt::format(
-          "it is {:.1f} mm off the place where the table's angle has it; in most views it is "
-          "{:.1f} mm",
-          departures[k], typical);
-    }
-    if (pass.scale != ScaleSource::given_poses) use_axis(problem, typical, pass);
+    if (pass.scale != ScaleSource::given_poses) use_axis(*rings, pass);
     return {};
   }
 
-  void use_axis(const BundleProblem& problem, double departure_mm, PassMotion& pass) {
+  bool drop_departures(const PassMotion& pass, const SfmRings& rings) {
+    const double typical = median(rings.departures_mm);
+    bool dropped = false;
+    for (std::size_t k = 0; k < rings.images.size(); ++k) {
+      const double distance = rings.problem.views[k].camera_from_board.translation.norm();
+      const double limit = std::max(options_.always_good_departure * distance,
+                                    options_.times_median_departure * typical);
+      if (rings.departures_mm[k] <= limit) continue;
+      view_of(pass, rings.images[k]).dropped = fmt::format(
+          "it is {:.1f} mm off the place where the table's angle has it; in most views it is "
+          "{:.1f} mm",
+          rings.departures_mm[k], typical);
+      dropped = true;
+    }
+    return dropped;
+  }
+
+  void use_axis(const SfmRings& rings, PassMotion& pass) {
+    const BundleProblem& problem = rings.problem;
     const Rigid3 table_from_frame = problem.axes.front().table_from_board();
     double scale = 1.0;
     if (pass.scale == ScaleSource::unknown && options_.camera_radius_mm) {
@@ -289,7 +294,7 @@ class MotionPoses {
     pass.frame_from_model = table * pass.frame_from_model;
     TableMotion motion;
     motion.pass = views_[pass.views.front()].pass;
-    motion.departure_mm = scale * departure_mm;
+    motion.departure_mm = scale * median(rings.departures_mm);
     motion.table_from_board = {table_from_frame.rotation, scale * table_from_frame.translation};
     motion.axis_offset_mm = motion.table_from_board.translation.head<2>().norm();
     double squares = 0.0;
