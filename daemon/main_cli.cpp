@@ -420,12 +420,19 @@ void add_commands(CLI::App& app, Command& chosen) {
             ->check(CLI::IsMember({"male", "female"}));
         approximate.add_option("--age", o.age_years, "years, if known");
         approximate.add_option("--bmi", o.body_mass_index, "body mass index, if known");
+        approximate.add_option("--ancestry", o.ancestry,
+                               "if known: written down; the model's people have none recorded");
         CLI::Option* tissue = approximate.add_option(
             "--tissue", o.tissue, "CSV of depths known at landmarks: landmark,depth_mm[,sd_mm]");
         approximate
             .add_flag("--mean-tissue", o.mean_tissue,
                       "the population's mean depths, as in the paper")
             ->excludes(tissue);
+        approximate
+            .add_option("--variants", o.variants,
+                        "faces in the grid of two tissue variations: 1, 9 or 25")
+            ->check(CLI::IsMember({1, 9, 25}))
+            ->capture_default_str();
         approximate.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
       });
 

@@ -1,16 +1,18 @@
 // How far approximated faces lie from the true ones: phantoms that the model never saw, each method
 // beside the others, as Markdown tables (docs/faces.md). Usage:
 //   bench_faces [--model FILE] [--people 20] [--seed 5000] [--out FOLDER]
-//               [--remains complete|no-mandible|no-calvaria|half-face]
+//               [--morphs]
 // Depths are the model's population mean (the paper's method), foretold from the skull (the
 // default), the same with sex, age and body mass index known, and the person's own.
 
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -20,7 +22,6 @@
 #include "reconstruction/approximation/face_error.h"
 #include "reconstruction/approximation/face_estimate.h"
 #include "reconstruction/io/ply.h"
-#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/phantom/person.h"
 #include "reconstruction/statistics/tissue_thickness.h"
 
@@ -33,29 +34,9 @@ struct Options {
   std::string model;
   int people = 20;
   std::uint64_t seed = 5000;
-  std::string remains = "complete";
+  bool morphs = false;        ///< how far morph targets are from faces fitted anew
   std::filesystem::path out;  ///< folder for the meshes; none if empty
 };
-
-Eigen::Vector3d landmark(const Person& person, std::string_view name) {
-  return person.bone.landmarks[landmark_index(person.bone.landmarks, name)].position_mm;
-}
-
-/// What is left of the person's skull.
-TriangleMesh remains_of(const Person& person, const std::string& remains) {
-  const TriangleMesh& skull = person.skull;
-  if (remains == "complete") return skull;
-  const double porion_y = landmark(person, "porion left").y();
-  const double calvaria_z = landmark(person, "glabella").z() + 15.0;
-  return submesh(skull, [&](Eigen::Index t) {
-    const Eigen::Vector3d center =
-        skull.vertices(skull.triangles.row(t), Eigen::all).colwise().mean().transpose();
-    if (remains == "no-mandible") return skull.triangles(t, 0) < person.cranium_vertices;
-    if (remains == "no-calvaria") return center.z() < calvaria_z;
-    const bool face = center.y() < porion_y && center.z() < calvaria_z;
-    return !(face && center.x() > 0.0);  // half-face: +x is the person's left
-  });
-}
 
 struct Method {
   const char* name;
@@ -103,20 +84,20 @@ Result<void> run(const Options& options) {
       load_model(options.model.empty() ? std::optional<std::filesystem::path>() : options.model);
   if (!source) return forward(source);
   const FaceModel& model = source->model;
-  fmt::print("{} people, seed {}, skull {}; {}\n\n", options.people, options.seed, options.remains,
-             source->name);
+  fmt::print("{} people, seed {}; {}\n\n", options.people, options.seed, source->name);
   fmt::print(
       "| person | method | face mean mm | P95 | over bone mean | in 80 % band |\n"
       "|---|---|---|---|---|---|\n");
   const PersonMaker maker(edge_mm, 0);
   std::map<std::string, std::vector<FaceError>> errors;
+  std::map<std::string, std::vector<double>> gaps_mm;
   double fit_s = 0.0;
   double face_s = 0.0;
   for (int i = 0; i < options.people; ++i) {
     const Person person =
         maker.make(draw_person(mix(options.seed, static_cast<std::uint64_t>(i))), 0);
     const Seconds begin = Seconds::now();
-    const auto skull = fit_case_skull(model, remains_of(person, options.remains));
+    const auto skull = fit_case_skull(model, person.skull);
     fit_s += (Seconds::now() - begin).processor;
     if (!skull) {
       fmt::print("| {} | {} |\n", i + 1, skull.error().message());
@@ -126,6 +107,7 @@ Result<void> run(const Options& options) {
     for (const Method& method : methods) {
       FaceOptions face_options;
       face_options.tissue = method.tissue;
+      face_options.variations = options.morphs && &method == &methods[1];
       if (method.facts) face_options.facts = facts_of(person);
       if (method.tissue == TissueChoice::measured) {
         auto depths = own_depths(model, *skull, skin);
@@ -136,6 +118,7 @@ Result<void> run(const Options& options) {
       const auto face = estimate_face(model, *skull, face_options);
       if (!face) return forward(face);
       face_s += (Seconds::now() - face_begin).processor;
+      for (const FaceVariation& v : face->variations) gaps_mm[v.name].push_back(v.refit_gap_mm);
       const FaceError error = face_error(model.head_template, face->head, face->band_mm, skin, 0);
       errors[method.name].push_back(error);
       if (!options.out.empty()) {
@@ -170,6 +153,16 @@ Result<void> run(const Options& options) {
     fmt::print("| mean | {} | {:.2f} | {:.2f} | {:.2f} | {:.0f} % |\n", method.name, mean.mean_mm,
                mean.p95_mm, mean.over_bone_mean_mm, 100.0 * mean.within_band);
   }
+  if (options.morphs) {
+    fmt::print(
+        "\n| morph target at 2 SD | from the face fitted anew, mm | worst person "
+        "|\n|---|---|---|\n");
+    for (const auto& [name, gaps] : gaps_mm) {
+      fmt::print("| {} | {:.2f} | {:.2f} |\n", name,
+                 std::accumulate(gaps.begin(), gaps.end(), 0.0) / static_cast<double>(gaps.size()),
+                 std::ranges::max(gaps));
+    }
+  }
   fmt::print("\nprocessor s: {:.1f} a skull, {:.1f} a face\n", fit_s / options.people,
              face_s / options.people / std::size(methods));
   return {};
@@ -184,8 +177,7 @@ int main(int argc, char** argv) {
   app.add_option("--model", options.model, "model file; without: the default model");
   app.add_option("--people", options.people, "how many");
   app.add_option("--seed", options.seed, "of the people");
-  app.add_option("--remains", options.remains, "what is left of the skulls")
-      ->check(CLI::IsMember({"complete", "no-mandible", "no-calvaria", "half-face"}));
+  app.add_flag("--morphs", options.morphs, "compare morph targets with faces fitted anew");
   app.add_option("--out", options.out, "folder to write the meshes to");
   CLI11_PARSE(app, argc, argv);
   if (const auto done = skullstation::run(options); !done) {

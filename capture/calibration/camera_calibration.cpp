@@ -9,10 +9,11 @@
 #include <numeric>
 #include <set>
 
-#include "capture/calibration/board_pose.h"
 #include "core/adjustment/bundle_solver.h"
 #include "core/adjustment/reprojection.h"
 #include "core/median.h"
+#include "core/root_mean_square.h"
+#include "core/session/board_pose.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -87,7 +88,7 @@ double search_focal_length(std::vector<ActiveView>& views, const CharucoBoard& b
     double cost = 0.0;
     poses.clear();
     for (const ActiveView& view : views) {
-      const auto pose = rough_board_pose(view.corners, board, lens);
+      const auto pose = find_board_pose(view.corners, board, lens);
       // A view that contradicts the others must not outweigh them.
       const double limit = 0.02 * side;
       cost += pose ? std::min(pose->rms_px, limit) : limit;
@@ -117,24 +118,15 @@ void choose_better_poses(std::vector<ActiveView>& views, const CharucoBoard& boa
                          const Lens& lens) {
   std::vector<double> rms_px;
   for (const ActiveView& view : views) {
-    rms_px.push_back(reprojection_rms_px(view.corners, board, lens, view.camera_from_board));
+    rms_px.push_back(
+        root_mean_square(corner_errors_px(view.corners, board, lens, view.camera_from_board)));
   }
   const double typical = median(rms_px);
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (rms_px[i] < 1.5 * typical) continue;
-    const auto other = estimate_board_pose(views[i].corners, board, lens);
+    const auto other = find_board_pose(views[i].corners, board, lens);
     if (other && other->rms_px < rms_px[i]) views[i].camera_from_board = other->camera_from_board;
   }
-}
-
-std::vector<double> corner_errors(const ActiveView& view, const CharucoBoard& board,
-                                  const Lens& lens) {
-  std::vector<double> errors;
-  for (const BoardCorner& corner : view.corners) {
-    const Eigen::Vector3d x = view.camera_from_board * board.corner(corner.id);
-    errors.push_back((lens.project(x) - corner.position_px).norm());
-  }
-  return errors;
 }
 
 /// Takes out what contradicts the rest: single corners, and views most of whose corners do.
@@ -147,7 +139,8 @@ bool remove_outliers(std::vector<ActiveView>& views, const CharucoBoard& board, 
   std::vector<double> view_medians;
   std::vector<double> all_errors;
   for (const ActiveView& view : views) {
-    const std::vector<double> errors = corner_errors(view, board, lens);
+    const std::vector<double> errors =
+        corner_errors_px(view.corners, board, lens, view.camera_from_board);
     view_medians.push_back(median(errors));
     all_errors.insert(all_errors.end(), errors.begin(), errors.end());
   }
@@ -167,7 +160,8 @@ bool remove_outliers(std::vector<ActiveView>& views, const CharucoBoard& board, 
       removed = true;
       continue;
     }
-    const std::vector<double> errors = corner_errors(view, board, lens);
+    const std::vector<double> errors =
+        corner_errors_px(view.corners, board, lens, view.camera_from_board);
     std::vector<BoardCorner> good;
     for (std::size_t c = 0; c < errors.size(); ++c) {
       if (errors[c] <= corner_limit) good.push_back(view.corners[c]);
@@ -342,8 +336,8 @@ Result<CameraCalibrationReport> calibrate_camera(const std::vector<CalibrationVi
   double squared_error = 0.0;
   for (const ActiveView& view : active) {
     CalibrationViewReport& about = report.views[view.index];
-    about.rms_px =
-        reprojection_rms_px(view.corners, board, calibration.lens, view.camera_from_board);
+    about.rms_px = root_mean_square(
+        corner_errors_px(view.corners, board, calibration.lens, view.camera_from_board));
     about.camera_from_board = view.camera_from_board;
     about.tilt_deg = degrees(std::asin(std::min(1.0, tilt_of(view.camera_from_board).norm())));
     squared_error += about.rms_px * about.rms_px * static_cast<double>(view.corners.size());

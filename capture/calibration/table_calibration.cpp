@@ -8,10 +8,10 @@
 #include <map>
 #include <set>
 
-#include "capture/calibration/board_pose.h"
 #include "capture/calibration/table_bundle.h"
 #include "capture/calibration/turn_regression.h"
 #include "core/linear_algebra.h"
+#include "core/session/board_pose.h"
 #include "core/units.h"
 
 namespace skullstation {
@@ -226,7 +226,7 @@ Result<TableCalibrationReport> calibrate_table(const std::vector<TableView>& vie
   for (std::size_t i = 0; i < prepared->observations.size(); ++i) {
     const TableObservation& seen = prepared->observations[i];
     const auto pose =
-        estimate_board_pose(seen.corners, board, lenses[static_cast<std::size_t>(seen.camera)]);
+        find_board_pose(seen.corners, board, lenses[static_cast<std::size_t>(seen.camera)]);
     if (!pose) {
       return fail(ErrorKind::no_result, prepared->names[i],
                   "the corners seen don't tell where the board is",

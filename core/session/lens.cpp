@@ -127,6 +127,14 @@ Eigen::Vector2d Lens::project(const Eigen::Vector3d& x_camera) const {
   return {fx * point.x() + cx, fy * point.y() + cy};
 }
 
+Eigen::Matrix<double, 2, 3> Lens::project_derivative(const Eigen::Vector3d& x_camera) const {
+  const Eigen::Vector2d point = x_camera.hnormalized();
+  Eigen::Matrix<double, 2, 3> by_point;
+  by_point << 1.0, 0.0, -point.x(), 0.0, 1.0, -point.y();
+  return Eigen::Vector2d(fx, fy).asDiagonal() * distort(*this, point).jacobian * by_point /
+         x_camera.z();
+}
+
 std::optional<Eigen::Vector3d> Lens::ray(const Eigen::Vector2d& x_px) const {
   const Eigen::Vector2d distorted((x_px.x() - cx) / fx, (x_px.y() - cy) / fy);
   const double fold2 = fold_squared_radius(*this);

@@ -36,6 +36,9 @@ struct Lens {
   /// Image point [px] of a point in camera coordinates (z > 0), distortion included.
   Eigen::Vector2d project(const Eigen::Vector3d& x_camera) const;
 
+  /// d px / d x_camera of project() [px per unit of x_camera].
+  Eigen::Matrix<double, 2, 3> project_derivative(const Eigen::Vector3d& x_camera) const;
+
   /// Direction (x, y, 1) of the ray through an image point: distortion undone by Newton
   /// iteration to 1e-10. Nothing where the distortion can't be undone (folded lens).
   std::optional<Eigen::Vector3d> ray(const Eigen::Vector2d& x_px) const;

@@ -37,6 +37,12 @@ std::string case_json(const FaceModel& model, const CaseSkull& skull, const Face
                          {"model_sd_mm", depth.model_sd_mm},
                          {"subjects", depth.subjects}});
   }
+  Json variations = Json::array();
+  for (const FaceVariation& variation : face.variations) {
+    variations.push_back({{"name", variation.name},
+                          {"sd_unit", variation.sd_unit},
+                          {"refit_gap_mm", variation.refit_gap_mm}});
+  }
   return Json{
              {"format", "skullstation-case/1"},
              {"input", {{"file", source.input}, {"sha256", source.input_sha256}}},
@@ -50,7 +56,12 @@ std::string case_json(const FaceModel& model, const CaseSkull& skull, const Face
              {"facts",
               {{"male", json_of(source.facts.male)},
                {"age_years", json_of(source.facts.age_years)},
-               {"body_mass_index", json_of(source.facts.body_mass_index)}}},
+               {"body_mass_index", json_of(source.facts.body_mass_index)},
+               {"ancestry", source.ancestry.empty() ? Json(nullptr) : Json(source.ancestry)}}},
+             {"tissue_from",
+              {{"source", source.tissue},
+               {"sha256",
+                source.tissue_sha256.empty() ? Json(nullptr) : Json(source.tissue_sha256)}}},
              {"anatomical_from_input", matrix_rows(skull.anatomical_from_input.matrix())},
              {"skull_fit",
               {{"facial_mean_mm", skull.quality.facial.mean_mm},
@@ -61,6 +72,7 @@ std::string case_json(const FaceModel& model, const CaseSkull& skull, const Face
                {"strangeness_sd", skull.strangeness}}},
              {"warnings", skull.warnings},
              {"face", {{"mean_sd_mm", face.sd_mm.mean()}, {"mean_band80_mm", face.band_mm.mean()}}},
+             {"variations", variations},
              {"tissue", landmarks}}
              .dump(2) +
          "\n";
@@ -100,28 +112,31 @@ Result<void> write_uncertainty(const TriangleMesh& head, const FaceEstimate& fac
 
 }  // namespace
 
-std::vector<FaceVariant> face_variants(const FaceEstimate& face) {
+std::vector<FaceVariant> face_variants(const FaceEstimate& face, int steps) {
   std::vector<const FaceVariation*> tissue;
   for (const FaceVariation& variation : face.variations) {
     if (variation.name.starts_with("tissue") && tissue.size() < 2) tissue.push_back(&variation);
   }
+  constexpr double reach_sd = FaceVariation::reach_sd;
+  std::vector<double> sds;
+  for (int i = 0; i < steps; ++i) {
+    sds.push_back(steps == 1 ? 0.0 : reach_sd * (2.0 * i / (steps - 1) - 1.0));
+  }
   std::vector<FaceVariant> variants;
-  for (const int second : {-2, 0, 2}) {
-    if (tissue.size() < 2 && second != 0) continue;
-    for (const int first : {-2, 0, 2}) {
-      if (tissue.empty() && first != 0) continue;
-      FaceVariant variant;
-      variant.name = "mean";
-      variant.head = face.head;
-      if (first != 0 || second != 0) variant.name.clear();
-      if (first != 0) {
-        variant.name = fmt::format("tissue 1 {:+d}", first);
+  for (const double second : sds) {
+    if (tissue.size() < 2 && second != 0.0) continue;
+    for (const double first : sds) {
+      if (tissue.empty() && first != 0.0) continue;
+      FaceVariant variant{"", face.head};
+      if (first != 0.0) {
+        variant.name = fmt::format("tissue 1 {:+g}", first);
         variant.head += first * tissue[0]->per_sd_mm;
       }
-      if (second != 0) {
-        variant.name += fmt::format("{}tissue 2 {:+d}", first != 0 ? ", " : "", second);
+      if (second != 0.0) {
+        variant.name += fmt::format("{}tissue 2 {:+g}", first != 0.0 ? ", " : "", second);
         variant.head += second * tissue[1]->per_sd_mm;
       }
+      if (variant.name.empty()) variant.name = "mean";
       variants.push_back(std::move(variant));
     }
   }
@@ -159,7 +174,7 @@ Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
   if (!drawn) return forward(drawn);
   pictures.uncertainty = *std::move(drawn);
   std::vector<std::pair<std::string, TriangleMesh>> variant_heads;
-  for (const FaceVariant& variant : face_variants(face)) {
+  for (const FaceVariant& variant : face_variants(face, source.variant_steps)) {
     const TriangleMesh mesh = head_mesh(model, variant.head);
     if (const auto written =
             write_glb(mesh, staged / "variants" / (file_name(variant.name) + ".glb"));

@@ -21,6 +21,10 @@ struct CaseSource {
   std::string model_card;  ///< what the model was made from, in plain words
   std::string program_version;
   PersonFacts facts;
+  std::string ancestry;       ///< as told; no model knows what to do with it
+  std::string tissue;         ///< where the depths come from, in plain words
+  std::string tissue_sha256;  ///< of the file of depths that were told; empty: none
+  int variant_steps = 3;      ///< of each of the two tissue variations: 1, 3 or 5
   std::uint64_t seed = 1;
 };
 
@@ -31,9 +35,10 @@ struct FaceVariant {
   Points3 head;
 };
 
-/// The grid of the paper, -2, 0 and +2 standard deviations along the first two tissue variations
-/// (fewer where the model has fewer), and leaner and fuller where the body mass index is unknown.
-std::vector<FaceVariant> face_variants(const FaceEstimate& face);
+/// The grid of the paper, -2 to +2 standard deviations along the first two tissue variations (fewer
+/// where the model has fewer), and leaner and fuller where the body mass index is unknown.
+/// \param steps of each variation: 1 (the mean alone), 3 (-2, 0, +2; the paper's), 5
+std::vector<FaceVariant> face_variants(const FaceEstimate& face, int steps = 3);
 
 /// Writes a case: skull_fitted.ply, head.ply, head.glb (variations as morph targets), variants/,
 /// spheres.ply, uncertainty.ply (sd_mm, band80_mm, from_bone for each vertex), tissue.csv,

@@ -66,6 +66,13 @@ Report case_report(const FaceModel& model, const CaseSkull& skull, const FaceEst
       "not shown; nose, lips, eyes and ears follow from bone only in part."});
   for (const std::string& warning : skull.warnings) report.add(Warning{"warning", warning});
   for (const std::string& warning : face.warnings) report.add(Warning{"warning", warning});
+  if (!source.ancestry.empty()) {
+    report.add(Warning{
+        "ancestry",
+        fmt::format("Told as \"{}\" and written down. It changes nothing: the model's people have "
+                    "none recorded, and published depths do not support one that counts.",
+                    source.ancestry)});
+  }
   report.add(Warning{"model", source.model_card});
   report.add(Pictures{pictures.face});
 
@@ -79,7 +86,8 @@ Report case_report(const FaceModel& model, const CaseSkull& skull, const FaceEst
 
   report.add(Heading{"Faces that are as plausible"});
   report.add(Paragraph{
-      "Two standard deviations along the ways in which the soft tissue of the model's subjects "
+      "Up to two standard deviations along the ways in which the soft tissue of the model's "
+      "subjects "
       "differs most, and leaner and fuller where the body mass index is not known. Show them "
       "together: whoever knew the person may recognise one and not another."});
   report.add(Pictures{pictures.variants});
@@ -88,6 +96,7 @@ Report case_report(const FaceModel& model, const CaseSkull& skull, const FaceEst
   report.add(Pictures{pictures.method});
   report.add(Table{{
       {"known besides the skull", facts_in_words(source.facts)},
+      {"soft tissue", source.tissue},
       {"skull's face to the fitted template",
        fmt::format("mean {:.2f} mm, 95 % within {:.2f} mm", skull.quality.facial.mean_mm,
                    skull.quality.facial.p95_mm)},

@@ -40,10 +40,20 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   source.facts = options.facts;
   source.seed = common.seed;
 
+  source.ancestry = command.ancestry;
+  source.variant_steps = command.variants == 1 ? 1 : command.variants == 9 ? 3 : 5;
+  source.tissue = command.mean_tissue
+                      ? "the population's mean depths"
+                      : "depths foretold from the skull and from what else is known";
   if (!command.tissue.empty()) {
     auto depths = read_known_depths(command.tissue, model.skull_template);
     if (!depths) return forward(depths);
     options.known_depths = *std::move(depths);
+    const auto table = read_file(command.tissue);
+    if (!table) return forward(table);
+    source.tissue += fmt::format(", bent to the {} depths of {}", options.known_depths.size(),
+                                 command.tissue.filename().string());
+    source.tissue_sha256 = sha256_hex(*table);
   }
 
   SkullRegistrationOptions fit_options;

@@ -186,7 +186,9 @@ struct ApproximateCommand {
   std::optional<std::string> sex;  ///< "male" or "female"
   std::optional<double> age_years;
   std::optional<double> body_mass_index;
+  std::string ancestry;          ///< written down; no model knows what to do with it
   std::filesystem::path tissue;  ///< CSV of depths known at landmarks; empty: none
+  int variants = 9;              ///< 1, 9 or 25: the grid of two tissue variations
   bool mean_tissue = false;      ///< the paper's way: the population's mean depths
   bool unit_unknown = false;
 };

@@ -9,6 +9,7 @@
 #include "core/file.h"
 #include "core/parallel.h"
 #include "reconstruction/io/mesh_file.h"
+#include "reconstruction/mesh/flat_cuts.h"
 #include "reconstruction/registration/head_led_by_skull.h"
 #include "reconstruction/registration/head_registration.h"
 #include "reconstruction/registration/skull_registration.h"
@@ -80,8 +81,10 @@ Result<ModelSubject> fit_subject(const fs::path& folder, const SkullTemplate& sk
   if (const auto read = read_facts(folder / "subject.json", subject); !read) return forward(read);
   const auto bone = read_mesh(folder / "skull.ply");
   if (!bone) return forward(bone);
-  const auto skin = read_mesh(folder / "skin.ply");
-  if (!skin) return forward(skin);
+  const auto whole_skin = read_mesh(folder / "skin.ply");
+  if (!whole_skin) return forward(whole_skin);
+  // Where the scan ended is no skin: neither head nor depths may take it for one.
+  const TriangleMesh skin = opened_at_flat_cuts(*whole_skin);
 
   SkullRegistrationOptions skull_options;
   skull_options.seed = options.seed;
@@ -104,7 +107,7 @@ Result<ModelSubject> fit_subject(const fs::path& folder, const SkullTemplate& sk
   head_options.start = head_led_by_skull(head, skull, *skull_fit);
   head_options.seed = options.seed;
   head_options.threads = options.threads;
-  const auto head_fit = register_head(head, *skin, head_options, progress.part(0.8, 1.0));
+  const auto head_fit = register_head(head, skin, head_options, progress.part(0.8, 1.0));
   if (!head_fit) return forward(head_fit);
 
   subject.skull = skull_fit->vertices;
@@ -117,7 +120,7 @@ Result<ModelSubject> fit_subject(const fs::path& folder, const SkullTemplate& sk
   ThicknessOptions thickness;
   thickness.threads = options.threads;
   const auto depths =
-      tissue_thickness(surface_of(skull, skull_fit->vertices), measurable, *skin, thickness);
+      tissue_thickness(surface_of(skull, skull_fit->vertices), measurable, skin, thickness);
   if (!depths) return forward(depths);
   subject.tissue_mm = *depths;
   return subject;

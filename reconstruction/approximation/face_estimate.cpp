@@ -147,21 +147,77 @@ Points3 bent_to_spheres(const FaceModel& model, const Points3& drawn,
   return head;
 }
 
-/// How the head follows a variable of the joint model when what is known stays as it is.
-FaceVariation variation_along(const FaceModel& model, const Belief& belief,
-                              const std::string& name) {
+/// How head and tissue follow a variable of the joint model when what is known stays as it is.
+struct JointStep {
+  double sd = 1.0;         ///< of the variable, in its own unit
+  Eigen::VectorXd head;    ///< coefficients, for each standard deviation
+  Eigen::VectorXd tissue;  ///< same
+};
+
+JointStep joint_step(const FaceModel& model, const Belief& belief, const std::string& name) {
   const int at = *model.joint.index_of(name);
+  JointStep step;
+  step.sd = std::sqrt(model.joint.covariance(at, at));
+  const auto followed = [&](const std::string& what, Index count) {
+    Eigen::VectorXd values = Eigen::VectorXd::Zero(count);
+    const std::vector<std::string> names = coefficient_names(what, count);
+    for (Index k = 0; k < count; ++k) {
+      const auto of = model.joint.index_of(names[static_cast<std::size_t>(k)]);
+      if (of) values[k] = belief.covariance(*of, at) / belief.covariance(at, at) * step.sd;
+    }
+    return values;
+  };
+  step.head = followed("head", model.head.mode_count());
+  step.tissue = followed("tissue", model.tissue.mode_count());
+  return step;
+}
+
+/// The head over a bone: as the spheres of these depths and what is foretold of its modes have it.
+class HeadFit {
+ public:
+  HeadFit(const FaceModel& model, const TriangleMesh& bone, const FaceOptions& options)
+      : model_(model), bone_(bone), options_(options) {}
+
+  /// \param tissue_mm the bone's vertices, NaN where not modelled
+  Points3 operator()(const Belief& prior, const Eigen::VectorXd& tissue_mm) const {
+    const Eigen::VectorXd radius_mm =
+        smoothed_depths(bone_, tissue_mm, options_.spheres.smoothing_mm);
+    const SphereContacts contacts(bone_, radius_mm);
+    const Belief drawn = drawn_to_spheres(model_, prior, contacts, bone_, radius_mm,
+                                          options_.rounds, options_.threads);
+    return bent_to_spheres(model_, shape_at(model_.head, drawn.mean), contacts, radius_mm,
+                           options_.rounds, options_.threads);
+  }
+
+ private:
+  const FaceModel& model_;
+  const TriangleMesh& bone_;
+  const FaceOptions& options_;
+};
+
+/// The variation of a face along a variable: half way between the faces fitted anew at either end.
+/// Depths vary in proportion, as in the paper's model, not by powers: a slider has to be linear.
+FaceVariation variation_along(const FaceModel& model, const HeadFit& fit, const Belief& belief,
+                              const Belief& prior, const FaceEstimate& face,
+                              const std::string& name) {
+  constexpr double reach_sd = FaceVariation::reach_sd;
+  const JointStep step = joint_step(model, belief, name);
+  const Eigen::ArrayXd growth = (model.tissue.modes * step.tissue).array();
+  const auto refitted = [&](double sds) {
+    Belief moved = prior;
+    moved.mean += sds * step.head;
+    const Eigen::ArrayXd depths = face.tissue_mm.array() * (1.0 + sds * growth);
+    return fit(moved, face.tissue_mm.array().isNaN().select(face.tissue_mm,
+                                                            depths.max(kThinnestTissue_mm)));
+  };
+  const Points3 above = refitted(reach_sd);
+  const Points3 below = refitted(-reach_sd);
   FaceVariation variation;
   variation.name = name;
-  variation.sd_unit = std::sqrt(model.joint.covariance(at, at));
-  Eigen::VectorXd step = Eigen::VectorXd::Zero(model.head.mode_count());
-  const double variance = belief.covariance(at, at);
-  const std::vector<std::string> names = coefficient_names("head", step.size());
-  for (Index k = 0; k < step.size(); ++k) {
-    const auto head = model.joint.index_of(names[static_cast<std::size_t>(k)]);
-    if (head) step[k] = belief.covariance(*head, at) / variance * variation.sd_unit;
-  }
-  variation.per_sd_mm = shape_at(model.head, step) - unflattened(model.head.mean);
+  variation.sd_unit = step.sd;
+  variation.per_sd_mm = (above - below) / (2.0 * reach_sd);
+  const Eigen::VectorXd gap_mm = (0.5 * (above + below) - face.head).rowwise().norm();
+  variation.refit_gap_mm = gap_mm.mean();
   return variation;
 }
 
@@ -235,12 +291,9 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
     return fail(ErrorKind::cancelled, "face", "stopped");
   }
 
-  progress.report(0.5, "head");
-  const SphereContacts contacts(bone, radius_mm);
-  const Belief drawn =
-      drawn_to_spheres(model, prior, contacts, bone, radius_mm, options.rounds, options.threads);
-  face.head = bent_to_spheres(model, shape_at(model.head, drawn.mean), contacts, radius_mm,
-                              options.rounds, options.threads);
+  progress.report(0.4, "head");
+  const HeadFit fit(model, bone, options);
+  face.head = fit(prior, face.tissue_mm);
   const Points3 normals = vertex_normals({face.head, model.head_template.triangles, {}, {}});
   // The bands were calibrated on what the joint model foretells from the skull; how much narrower
   // the spheres make them is not known from left-out subjects, so that it is not claimed.
@@ -256,13 +309,16 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
         "The model's heads are of other people than its skulls: nose, lips, eyes and ears do not "
         "follow from the skull, only from the soft tissue around them.");
   }
-  for (const std::string& name : coefficient_names("tissue", model.tissue.mode_count())) {
-    if (model.joint.index_of(name)) {
-      face.variations.push_back(variation_along(model, belief, name));
-    }
-  }
-  if (model.joint.index_of("body mass index") && !options.facts.body_mass_index) {
-    face.variations.push_back(variation_along(model, belief, "body mass index"));
+
+  if (!options.variations) return face;
+  std::vector<std::string> names = coefficient_names("tissue", model.tissue.mode_count());
+  if (!options.facts.body_mass_index) names.emplace_back("body mass index");
+  std::erase_if(names, [&](const std::string& name) { return !model.joint.index_of(name); });
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    progress.report(0.5 + 0.5 * static_cast<double>(i) / static_cast<double>(names.size()),
+                    "variants");
+    if (progress.stop.stop_requested()) return fail(ErrorKind::cancelled, "face", "stopped");
+    face.variations.push_back(variation_along(model, fit, belief, prior, face, names[i]));
   }
   return face;
 }

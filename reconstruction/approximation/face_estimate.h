@@ -33,17 +33,22 @@ struct FaceOptions {
   /// certain.
   std::vector<KnownDepth> known_depths;
   SphereModelOptions spheres;
-  int rounds = 6;   ///< of correspondences between head and sphere model
-  int threads = 0;  ///< 0: all
+  int rounds = 6;          ///< of correspondences between head and sphere model
+  bool variations = true;  ///< find out how the face may vary, too
+  int threads = 0;         ///< 0: all
 
   Result<void> validate() const;
 };
 
-/// One direction in which the face may differ: added to the head for each standard deviation.
+/// One direction in which the face may differ: added to the head for each standard deviation. Made
+/// of faces that were fitted anew `reach_sd` above and below.
 struct FaceVariation {
-  std::string name;      ///< "tissue 1", "body mass index"
-  Points3 per_sd_mm;     ///< head vertices x 3
-  double sd_unit = 1.0;  ///< what a standard deviation is in the variable's own unit
+  static constexpr double reach_sd = 2.0;
+
+  std::string name;           ///< "tissue 1", "body mass index"
+  Points3 per_sd_mm;          ///< head vertices x 3
+  double sd_unit = 1.0;       ///< what a standard deviation is in the variable's own unit
+  double refit_gap_mm = 0.0;  ///< from the faces fitted anew there, mean over the vertices
 };
 
 /// A face, how it may vary, and how far it may be off. Anatomical frame.

@@ -3,38 +3,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
+
+#include "core/disjoint_sets.h"
 
 namespace skullstation {
 
 namespace {
-
-/// Union-find with path halving.
-class Sets {
- public:
-  explicit Sets(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-
-  int root(int a) {
-    while (parent(a) != a) {
-      parent(a) = parent(parent(a));
-      a = parent(a);
-    }
-    return a;
-  }
-
-  void join(int a, int b) {
-    a = root(a);
-    b = root(b);
-    if (a != b) parent(std::max(a, b)) = std::min(a, b);
-  }
-
- private:
-  int& parent(int a) { return parent_[static_cast<std::size_t>(a)]; }
-
-  std::vector<int> parent_;
-};
 
 struct HalfEdge {
   std::uint64_t edge = 0;  // both vertices, the lower one first
@@ -63,7 +37,7 @@ std::vector<HalfEdge> sorted_half_edges(const Triangles& triangles) {
 /// leaves more than one group.
 std::size_t count_split_vertices(const TriangleMesh& mesh,
                                  const std::vector<HalfEdge>& half_edges) {
-  Sets corners(static_cast<std::size_t>(mesh.triangles.size()));
+  DisjointSets corners(static_cast<std::size_t>(mesh.triangles.size()));
   const auto corner_at = [&](int triangle, std::uint32_t vertex) {
     for (int c = 0; c < 3; ++c) {
       if (mesh.triangles(triangle, c) == static_cast<int>(vertex)) return 3 * triangle + c;
@@ -147,7 +121,7 @@ std::vector<bool> boundary_vertices(const Triangles& triangles, Eigen::Index ver
 }
 
 std::vector<int> component_of_triangles(const TriangleMesh& mesh) {
-  Sets sets(static_cast<std::size_t>(mesh.vertices.rows()));
+  DisjointSets sets(static_cast<std::size_t>(mesh.vertices.rows()));
   for (Eigen::Index f = 0; f < mesh.triangles.rows(); ++f) {
     sets.join(mesh.triangles(f, 0), mesh.triangles(f, 1));
     sets.join(mesh.triangles(f, 0), mesh.triangles(f, 2));

@@ -1,10 +1,13 @@
 #include "reconstruction/photogrammetry/coverage.h"
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <utility>
+#include <vector>
 
 #include "core/parallel.h"
+#include "reconstruction/mesh/mesh_topology.h"
 
 namespace skullstation {
 
@@ -14,22 +17,15 @@ constexpr int kBatch = 4096;
 
 /// Lengths of edges that belong to one triangle only.
 double border_mm(const TriangleMesh& mesh) {
-  std::vector<std::pair<int, int>> sides;
-  sides.reserve(3 * mesh.triangles.rows());
-  for (Eigen::Index f = 0; f < mesh.triangles.rows(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      sides.push_back(std::minmax({mesh.triangles(f, k), mesh.triangles(f, (k + 1) % 3)}));
-    }
-  }
-  std::sort(sides.begin(), sides.end());
+  const std::vector<std::array<bool, 3>> open = boundary_edges(mesh.triangles);
   double length = 0.0;
-  for (std::size_t i = 0; i < sides.size();) {
-    std::size_t end = i + 1;
-    while (end < sides.size() && sides[end] == sides[i]) ++end;
-    if (end == i + 1) {
-      length += (mesh.vertices.row(sides[i].first) - mesh.vertices.row(sides[i].second)).norm();
+  for (Eigen::Index f = 0; f < mesh.triangles.rows(); ++f) {
+    for (int side = 0; side < 3; ++side) {
+      if (!open[static_cast<std::size_t>(f)][static_cast<std::size_t>(side)]) continue;
+      length += (mesh.vertices.row(mesh.triangles(f, side)) -
+                 mesh.vertices.row(mesh.triangles(f, (side + 1) % 3)))
+                    .norm();
     }
-    i = end;
   }
   return length;
 }

@@ -8,9 +8,10 @@
 
 #include "core/median.h"
 #include "core/parallel.h"
+#include "core/root_mean_square.h"
+#include "core/session/board_pose.h"
 #include "core/units.h"
 #include "reconstruction/photogrammetry/bundle_adjustment.h"
-#include "reconstruction/photogrammetry/poses_pnp.h"
 #include "reconstruction/photogrammetry/poses_rings.h"
 #include "reconstruction/photogrammetry/scale_check.h"
 
@@ -104,7 +105,7 @@ Lens search_lens(const std::vector<PoseObservation>& views, int camera, int widt
     const double limit_px = 0.02 * side;
     double cost = 0.0;
     for (std::size_t i = 0; i < chosen.size(); i += stride) {
-      const auto found = find_board(chosen[i]->corners, board, lens);
+      const auto found = find_board_pose(chosen[i]->corners, board, lens);
       cost += found ? std::min(found->rms_px, limit_px) : limit_px;
     }
     if (cost < best_cost) {
@@ -132,11 +133,11 @@ Work begin(const std::vector<PoseObservation>& views, const std::vector<PoseCame
     if (camera.model == LensModel::pinhole) std::fill(lens.sd.begin() + 4, lens.sd.end(), 0.0);
     lens.known = lens.lens;
   }
-  std::vector<std::optional<BoardView>> found(views.size());
+  std::vector<std::optional<BoardPose>> found(views.size());
   parallel_for(static_cast<int>(views.size()), options.threads, [&](int i) {
     const PoseObservation& view = views[static_cast<std::size_t>(i)];
     if (std::cmp_less(view.corners.size(), options.least_corners)) return;
-    found[static_cast<std::size_t>(i)] = find_board(
+    found[static_cast<std::size_t>(i)] = find_board_pose(
         view.corners, board, work.bundle.lenses[static_cast<std::size_t>(view.camera)].lens);
   });
   for (std::size_t i = 0; i < views.size(); ++i) {

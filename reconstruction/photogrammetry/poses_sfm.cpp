@@ -10,10 +10,11 @@
 
 #include "core/median.h"
 #include "core/parallel.h"
+#include "core/root_mean_square.h"
+#include "core/session/board_pose.h"
 #include "core/units.h"
 #include "reconstruction/photogrammetry/colmap_model.h"
 #include "reconstruction/photogrammetry/masks_evidence.h"
-#include "reconstruction/photogrammetry/poses_pnp.h"
 #include "reconstruction/photogrammetry/sfm_frame.h"
 #include "reconstruction/photogrammetry/sfm_rings.h"
 
@@ -206,7 +207,7 @@ class MotionPoses {
       if (source == ScaleSource::given_poses) reference = view.given;
       if (source == ScaleSource::board && view.corners.size() >= least_corners) {
         const auto lens = static_cast<std::size_t>(view.camera);
-        const auto found = find_board(view.corners, *board_, pass.model.lenses[lens]);
+        const auto found = find_board_pose(view.corners, *board_, pass.model.lenses[lens]);
         if (found) reference = found->camera_from_board;
       }
       if (reference) known.push_back({*reference, *pass.model.camera_from_model[i]});

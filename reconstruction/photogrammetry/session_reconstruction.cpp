@@ -6,9 +6,9 @@
 #include <map>
 
 #include "core/parallel.h"
+#include "core/session/board_pose.h"
 #include "core/session/image_file.h"
 #include "reconstruction/photogrammetry/masks.h"
-#include "reconstruction/photogrammetry/poses_pnp.h"
 #include "reconstruction/photogrammetry/surface_extraction.h"
 
 namespace skullstation {
@@ -31,7 +31,7 @@ std::optional<Rigid3> camera_from_board(const Session& session, const PoseResult
   if (poses.scale == ScaleSource::board) {
     return pose.camera_from_table * poses.table_from_board(observation.pass);
   }
-  const auto found = find_board(observation.corners, *session.board, lens);
+  const auto found = find_board_pose(observation.corners, *session.board, lens);
   return found ? std::optional(found->camera_from_board) : std::nullopt;
 }
 

@@ -78,21 +78,34 @@ OrientedPoints points_of(const SkullTemplate& skull, const TriangleMesh& surface
 struct Target {
   const OrientedPoints& points;
   const PointTree& tree;
+  /// There is nothing but the part to be found here: what it leaves uncovered counts against it.
+  bool all_of_it = false;
 };
 
 /// Mean truncated squared distance of the points from the target where the normals agree [mm^2].
-double cost_of(const OrientedPoints& points, const Similarity3& transform, const Target& target) {
+double one_way_cost(const OrientedPoints& points, const Target& target) {
   double sum = 0.0;
   for (Eigen::Index i = 0; i < points.size(); ++i) {
-    const NearPoint near =
-        target.tree.nearest(transform * points.positions.row(i).transpose(), kTruncation_mm);
+    const NearPoint near = target.tree.nearest(points.positions.row(i), kTruncation_mm);
     const bool agrees =
-        near.index >= 0 &&
-        target.points.normals.row(near.index)
-                .dot((transform.rotation * points.normals.row(i).transpose()).transpose()) > 0.5;
+        near.index >= 0 && target.points.normals.row(near.index).dot(points.normals.row(i)) > 0.5;
     sum += agrees ? near.squared_distance : kTruncation_mm * kTruncation_mm;
   }
   return sum / static_cast<double>(std::max<Eigen::Index>(1, points.size()));
+}
+
+/// The same for a part that is moved; where all of the target is to be covered, the mean of both
+/// ways.
+double cost_of(const OrientedPoints& points, const Similarity3& transform, const Target& target) {
+  OrientedPoints moved = points;
+  for (Eigen::Index i = 0; i < points.size(); ++i) {
+    moved.positions.row(i) = (transform * points.positions.row(i).transpose()).transpose();
+    moved.normals.row(i) = (transform.rotation * points.normals.row(i).transpose()).transpose();
+  }
+  const double there = one_way_cost(moved, target);
+  if (!target.all_of_it) return there;
+  const PointTree tree(moved.positions);
+  return 0.5 * (there + one_way_cost(target.points, {moved, tree}));
 }
 
 bool within(const Bounds& bounds, const Similarity3& now, const Similarity3& parent,
@@ -139,9 +152,10 @@ std::optional<Similarity3> align_part(const OrientedPoints& points, const Target
   return best;
 }
 
-/// The mandible closed and opened about the axis through its condyles.
+/// The mandible closed and opened about the axis through its condyles, and following the upper
+/// teeth. `cranium` is where the unbent one lies, `bent` where its vertices are.
 std::vector<Similarity3> mandible_starts(const SkullTemplate& skull, const TriangleMesh& surface,
-                                         const Eigen::Affine3d& cranium) {
+                                         const Eigen::Affine3d& cranium, const Points3& bent) {
   std::vector<Similarity3> starts;
   std::optional<Eigen::Vector3d> left;
   std::optional<Eigen::Vector3d> right;
@@ -155,6 +169,15 @@ std::vector<Similarity3> mandible_starts(const SkullTemplate& skull, const Trian
   if (!left || !right) return {Similarity3{}};
   const Eigen::Vector3d hinge = cranium * Eigen::Vector3d(0.5 * (*left + *right));
   const Eigen::Vector3d axis = (*left - *right).normalized();
+  Eigen::Vector3d teeth_moved = Eigen::Vector3d::Zero();
+  int teeth = 0;
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    if (skull.region[static_cast<std::size_t>(v)] != upper_teeth) continue;
+    teeth_moved +=
+        bent.row(v).transpose() - cranium * Eigen::Vector3d(surface.vertices.row(v).transpose());
+    ++teeth;
+  }
+  teeth_moved /= std::max(1, teeth);
   for (const double opening_deg : {0.0, 10.0, 20.0}) {
     for (const double drop_mm : {0.0, 10.0, 20.0}) {  // a longer face, a thick disc in the joint
       Similarity3 start;
@@ -162,6 +185,10 @@ std::vector<Similarity3> mandible_starts(const SkullTemplate& skull, const Trian
       start.translation = hinge - start.rotation * hinge - drop_mm * Eigen::Vector3d::UnitZ();
       starts.push_back(start);
     }
+    Similarity3 start;
+    start.rotation = Eigen::AngleAxisd(radians(opening_deg), axis);
+    start.translation = hinge - start.rotation * hinge + teeth_moved;
+    starts.push_back(start);
   }
   return starts;
 }
@@ -173,15 +200,15 @@ Eigen::Affine3d affine(const Similarity3& similarity) {
   return result;
 }
 
-/// The input without what lies on the cranium as it was found.
-OrientedPoints beyond_cranium(const SkullTemplate& skull, const TriangleMesh& surface,
-                              const Eigen::Affine3d& cranium, const InputSurface& input) {
+/// The input without what lies on the cranium.
+OrientedPoints beyond_cranium(const SkullTemplate& skull, const Points3& bent,
+                              const InputSurface& input) {
   constexpr double kOnCranium_mm = 4.0;
   Points3 bone(skull.boundary_count, 3);
   Eigen::Index count = 0;
   for (int v = 0; v < skull.boundary_count; ++v) {
     if (bone_of(skull.region[static_cast<std::size_t>(v)]) != SkullBone::cranium) continue;
-    bone.row(count++) = (cranium * surface.vertices.row(v).transpose()).transpose();
+    bone.row(count++) = bent.row(v);
   }
   bone.conservativeResize(count, 3);
   const PointTree tree(bone);
@@ -197,59 +224,66 @@ OrientedPoints beyond_cranium(const SkullTemplate& skull, const TriangleMesh& su
   return rest;
 }
 
-/// Both bones: first as they are, then stretched.
-void align_bones(const SkullTemplate& skull, const TriangleMesh& surface, const InputSurface& input,
-                 PartAlignment& result) {
-  std::array<Regions, 2> bones;
+Regions regions_of(SkullBone bone) {
+  Regions regions;
   for (int r = 0; r < kSkullRegionCount; ++r) {
     const auto region = static_cast<SkullRegion>(r);
-    bones[static_cast<std::size_t>(bone_of(region))].push_back(region);
+    if (bone_of(region) == bone) regions.push_back(region);
   }
-  result.bones.fill(Eigen::Affine3d::Identity());
-  const Target whole{input.samples(), input.sample_tree()};
-  // The cranium first; the mandible goes with it, and is looked for in what the cranium leaves.
-  for (std::size_t b = 0; b < bones.size(); ++b) {
-    const OrientedPoints own = points_of(skull, surface, bones[b]);
-    const Eigen::Affine3d parent = b == 0 ? Eigen::Affine3d::Identity() : result.bones[0];
-    const OrientedPoints points = transformed(parent, own);
-    std::optional<Similarity3> found;
-    if (b == 0) {
-      found = align_part(points, whole, Similarity3{}, {Similarity3{}}, kBone);
-    } else {
-      const OrientedPoints rest = beyond_cranium(skull, surface, parent, input);
-      if (rest.size() >= kLeastSamples) {
-        const PointTree tree(rest.positions);
-        found = align_part(points, {rest, tree}, Similarity3{},
-                           mandible_starts(skull, surface, parent), kBone);
-      }
-    }
-    const Similarity3 placed = found.value_or(Similarity3{});
-    // A scan without cranium is refused by its size and shape; without mandible many are.
-    const bool there = b == 0 || cost_of(points, placed, whole) < kFoundCost_mm2;
-    if (b == 1) result.mandible_found = there;
-    ++result.parts;
-    result.accepted += found.has_value() ? 1 : 0;
-    result.bones[b] = affine(placed) * parent;
-    if (!there) continue;
-    for (const double reach_mm : {12.0, 6.0}) {
-      result.bones[b] = fit_affine(own, input, result.bones[b], reach_mm);
-    }
-  }
+  return regions;
+}
+
+Eigen::Affine3d stretched(const OrientedPoints& points, const InputSurface& input,
+                          Eigen::Affine3d placed) {
+  for (const double reach_mm : {12.0, 6.0}) placed = fit_affine(points, input, placed, reach_mm);
+  return placed;
 }
 
 }  // namespace
 
-PartAlignment align_parts(const SkullTemplate& skull, const TriangleMesh& surface,
-                          const InputSurface& input, int threads) {
+PartAlignment align_cranium(const SkullTemplate& skull, const TriangleMesh& surface,
+                            const InputSurface& input) {
   PartAlignment result;
-  align_bones(skull, surface, input, result);
-  TriangleMesh stretched = surface;
+  const Target whole{input.samples(), input.sample_tree()};
+  const OrientedPoints points = points_of(skull, surface, regions_of(SkullBone::cranium));
+  const auto found = align_part(points, whole, Similarity3{}, {Similarity3{}}, kBone);
+  ++result.parts;
+  result.accepted += found.has_value() ? 1 : 0;
+  // A scan without cranium is refused by its size and shape.
+  result.bones.fill(stretched(points, input, affine(found.value_or(Similarity3{}))));
+  return result;
+}
+
+void find_mandible(const SkullTemplate& skull, const TriangleMesh& surface, const Points3& bent,
+                   const InputSurface& input, PartAlignment& parts) {
+  const Target whole{input.samples(), input.sample_tree()};
+  const Eigen::Affine3d cranium = parts.bones[static_cast<std::size_t>(SkullBone::cranium)];
+  const OrientedPoints own = points_of(skull, surface, regions_of(SkullBone::mandible));
+  const OrientedPoints points = transformed(cranium, own);
+  const OrientedPoints rest = beyond_cranium(skull, bent, input);
+  std::optional<Similarity3> found;
+  if (rest.size() >= kLeastSamples) {
+    const PointTree tree(rest.positions);
+    found = align_part(points, {rest, tree, true}, Similarity3{},
+                       mandible_starts(skull, surface, cranium, bent), kBone);
+  }
+  const Similarity3 placed = found.value_or(Similarity3{});
+  parts.mandible_found = cost_of(points, placed, whole) < kFoundCost_mm2;
+  ++parts.parts;
+  parts.accepted += found.has_value() ? 1 : 0;
+  Eigen::Affine3d& mandible = parts.bones[static_cast<std::size_t>(SkullBone::mandible)];
+  mandible = affine(placed) * cranium;
+  if (parts.mandible_found) mandible = stretched(own, input, mandible);
+}
+
+void align_regions(const SkullTemplate& skull, const TriangleMesh& surface,
+                   const InputSurface& input, int threads, PartAlignment& result) {
+  TriangleMesh placed = surface;
   for (int v = 0; v < skull.boundary_count; ++v) {
     const auto bone = static_cast<std::size_t>(bone_of(skull.region[static_cast<std::size_t>(v)]));
-    stretched.vertices.row(v) =
-        (result.bones[bone] * surface.vertices.row(v).transpose()).transpose();
+    placed.vertices.row(v) = (result.bones[bone] * surface.vertices.row(v).transpose()).transpose();
   }
-  stretched.normals = vertex_normals(stretched);
+  placed.normals = vertex_normals(placed);
 
   const Target whole{input.samples(), input.sample_tree()};
   struct Found {
@@ -261,7 +295,7 @@ PartAlignment align_parts(const SkullTemplate& skull, const TriangleMesh& surfac
       Found& part = parts[static_cast<std::size_t>(p)];
       const Similarity3& parent = result.regions[static_cast<std::size_t>(part.regions.front())];
       part.transform =
-          align_part(points_of(skull, stretched, part.regions), whole, parent, {parent}, bounds);
+          align_part(points_of(skull, placed, part.regions), whole, parent, {parent}, bounds);
     });
     for (const Found& part : parts) {
       ++result.parts;
@@ -280,7 +314,6 @@ PartAlignment align_parts(const SkullTemplate& skull, const TriangleMesh& surfac
     parts.push_back({{static_cast<SkullRegion>(r)}, std::nullopt});
   }
   level(std::move(parts), kRegion);
-  return result;
 }
 
 }  // namespace skullstation

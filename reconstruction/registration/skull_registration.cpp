@@ -48,6 +48,11 @@ constexpr Level kLevels[] = {
     {"two-way, softer", 1e2, 1.0, {3.0, 35.0}, 0.05, Search::two_way, 3},
     {"fine", 1e1, 0.1, {2.0, 30.0}, 0.05, Search::two_way, 3},
 };
+/// Of the cranium alone, before the mandible is looked for.
+constexpr Level kCraniumLevels[] = {
+    {"", 1e6, 1.0, {20.0, 45.0, 8.0}, 0.0, Search::far, 2},
+    {"", 1e5, 1.0, {15.0, 45.0, 6.0}, 0.0, Search::far, 3},
+};
 constexpr double kPartsSmooth_mm4 = 1e6;
 constexpr PairLimits kPartLimits{5.0, 45.0};
 constexpr double kRidgeShare = 0.3;
@@ -86,21 +91,32 @@ class Fit {
     }
   }
 
-  /// Hierarchical ICP, then the whole template after its parts.
+  /// Hierarchical ICP, then the whole template after its parts. The cranium is bent by itself
+  /// before the mandible is looked for, and begins anew with it.
   PartAlignment follow_parts() {
+    const TriangleMesh surface = state_.surface;
+    const Points3 unplaced = state_.vertices;
     begin_stage();
-    PartAlignment parts = align_parts(skull_, state_.surface, input_, options_.threads);
-    Points3 placed(skull_.vertices.rows(), 3);
-    for (Eigen::Index v = 0; v < placed.rows(); ++v) {
-      const auto bone =
-          static_cast<std::size_t>(bone_of(skull_.region[static_cast<std::size_t>(v)]));
-      placed.row(v) = (parts.bones[bone] * state_.vertices.row(v).transpose()).transpose();
+    PartAlignment parts = align_cranium(skull_, surface, input_);
+    place(unplaced, parts);
+    SkullPairs pairs;
+    double move = 0.0;
+    for (const Level& level : kCraniumLevels) {
+      for (int iteration = 0; iteration < level.iterations; ++iteration) {
+        pairs = pairs_of(level);
+        move = deform(rest_, pairs, level.smooth_mm4, level.volume, iteration == 0);
+        rest_ = state_.vertices;
+      }
     }
-    state_ = state_of(skull_, std::move(placed));
-    rest_ = state_.vertices;
+    end_stage("cranium", 1, pairs, move);
+
+    begin_stage();
+    find_mandible(skull_, surface, state_.surface.vertices, input_, parts);
+    align_regions(skull_, surface, input_, options_.threads, parts);
+    place(unplaced, parts);
     mandible_found_ = parts.mandible_found;
-    const SkullPairs pairs = part_pairs(state_, parts, input_, kPartLimits, options_.threads);
-    const double move = deform(rest_, pairs, kPartsSmooth_mm4, 1.0, true);
+    pairs = part_pairs(state_, parts, input_, kPartLimits, options_.threads);
+    move = deform(rest_, pairs, kPartsSmooth_mm4, 1.0, true);
     end_stage("parts", 1, pairs, move);
     return parts;
   }
@@ -174,6 +190,18 @@ class Fit {
   FitStages take_stages() { return std::move(stages_); }
 
  private:
+  /// Both bones of the template where their parts went.
+  void place(const Points3& vertices, const PartAlignment& parts) {
+    Points3 placed(vertices.rows(), 3);
+    for (Eigen::Index v = 0; v < placed.rows(); ++v) {
+      const auto bone =
+          static_cast<std::size_t>(bone_of(skull_.region[static_cast<std::size_t>(v)]));
+      placed.row(v) = (parts.bones[bone] * vertices.row(v).transpose()).transpose();
+    }
+    state_ = state_of(skull_, std::move(placed));
+    rest_ = state_.vertices;
+  }
+
   SkullPairs pairs_of(const Level& level) const {
     if (level.search == Search::far) {
       SkullPairs pairs = far_pairs(state_, input_, level.limits, options_.threads);

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <numeric>
 #include <vector>
 
+#include "core/disjoint_sets.h"
 #include "core/parallel.h"
 #include "reconstruction/distance/triangle_bvh.h"
 #include "reconstruction/phantom/canonical_skull.h"
@@ -33,16 +33,7 @@ double edge_mm_at(const Eigen::Vector3d& point, double face_edge_mm) {
 
 /// Only the largest set of tetrahedra that hang together by faces.
 void keep_largest_piece(TetrahedralMesh& mesh) {
-  std::vector<int> parent(static_cast<std::size_t>(mesh.tetrahedra.rows()));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int t) {
-    while (parent[static_cast<std::size_t>(t)] != t) {
-      auto& p = parent[static_cast<std::size_t>(t)];
-      p = parent[static_cast<std::size_t>(p)];
-      t = p;
-    }
-    return t;
-  };
+  DisjointSets pieces(static_cast<std::size_t>(mesh.tetrahedra.rows()));
   std::map<std::array<int, 3>, int> open;
   for (int t = 0; t < mesh.tetrahedra.rows(); ++t) {
     for (const auto& face : kFaces) {
@@ -50,11 +41,11 @@ void keep_largest_piece(TetrahedralMesh& mesh) {
                              mesh.tetrahedra(t, face[2])};
       std::ranges::sort(key);
       const auto [place, added] = open.try_emplace(key, t);
-      if (!added) parent[static_cast<std::size_t>(root(t))] = root(place->second);
+      if (!added) pieces.join(t, place->second);
     }
   }
   std::map<int, int> sizes;
-  for (int t = 0; t < mesh.tetrahedra.rows(); ++t) ++sizes[root(t)];
+  for (int t = 0; t < mesh.tetrahedra.rows(); ++t) ++sizes[pieces.root(t)];
   const int largest =
       std::ranges::max_element(sizes, {}, [](const auto& entry) { return entry.second; })->first;
   std::vector<int> number(static_cast<std::size_t>(mesh.vertices.rows()), -1);
@@ -64,7 +55,7 @@ void keep_largest_piece(TetrahedralMesh& mesh) {
   int vertices = 0;
   int tetrahedra = 0;
   for (int t = 0; t < mesh.tetrahedra.rows(); ++t) {
-    if (root(t) != largest) continue;
+    if (pieces.root(t) != largest) continue;
     for (int i = 0; i < 4; ++i) {
       int& v = number[static_cast<std::size_t>(mesh.tetrahedra(t, i))];
       if (v < 0) {

@@ -5,18 +5,11 @@
 #include <cstring>
 #include <iterator>
 
+#include "core/disjoint_sets.h"
+
 namespace skullstation {
 
 namespace {
-
-int root_of(std::vector<int>& parent, int a) {
-  auto up = [&](int x) -> int& { return parent[static_cast<std::size_t>(x)]; };
-  while (up(a) != a) {
-    up(a) = up(up(a));
-    a = up(a);
-  }
-  return a;
-}
 
 /// How far beyond its ends a run reaches for neighbours in the row that lies `dj`, `dk` away; -1
 /// if that row has none.
@@ -34,7 +27,7 @@ int reach(int dj, int dk, Connectivity connectivity) {
 
 VoxelComponents::VoxelComponents(const VoxelMask& mask, Connectivity connectivity)
     : size_(mask.size) {
-  std::vector<int> parent;
+  DisjointSets sets;
   const int width = size_.x();
   row_start_.reserve(static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(size_.z()) + 1);
   for (int k = 0; k < size_.z(); ++k) {
@@ -48,7 +41,7 @@ VoxelComponents::VoxelComponents(const VoxelMask& mask, Connectivity connectivit
       };
       for (int begin = find(0, 1); begin < width;) {
         const int end = find(begin, 0);
-        parent.push_back(static_cast<int>(runs_.size()));
+        sets.add();
         runs_.push_back({begin, end, 0});
         begin = end < width ? find(end, 1) : width;
       }
@@ -69,9 +62,7 @@ VoxelComponents::VoxelComponents(const VoxelMask& mask, Connectivity connectivit
           while (other < other_end && runs_[other].end + extra <= runs_[own].begin) ++other;
           for (std::size_t o = other; o < other_end && runs_[o].begin < runs_[own].end + extra;
                ++o) {
-            const int a = root_of(parent, static_cast<int>(own));
-            const int b = root_of(parent, static_cast<int>(o));
-            if (a != b) parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+            sets.join(static_cast<int>(own), static_cast<int>(o));
           }
         }
       }
@@ -91,7 +82,7 @@ VoxelComponents::VoxelComponents(const VoxelMask& mask, Connectivity connectivit
       }
     }
     VoxelRun& run = runs_[r];
-    int& root_number = number[static_cast<std::size_t>(root_of(parent, static_cast<int>(r)))];
+    int& root_number = number[static_cast<std::size_t>(sets.root(static_cast<int>(r)))];
     const Eigen::Vector3i first(run.begin, j, k);
     const Eigen::Vector3i last(run.end - 1, j, k);
     if (root_number < 0) {

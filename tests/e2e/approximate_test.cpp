@@ -153,6 +153,26 @@ TEST_F(ApproximateRefuses, ASkullBesideAnotherObject) {
   refuses(beside(mean_skull(), cube()), "give one adult human skull and nothing else");
 }
 
+TEST(Approximate, IsTheSameBytesForAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  const std::string skull = (folder / "skull.ply").string();
+  ASSERT_TRUE(write_ply(mean_skull(), skull));
+  for (const char* threads : {"1", "2"}) {
+    const ProcessResult result =
+        skullstation_cli({"approximate", skull, "--out", (folder / threads).string(), "--threads",
+                          threads, "--bmi", "24", "--ancestry", "unknown"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  int compared = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "1")) {
+    if (!entry.is_regular_file()) continue;
+    const auto other = folder / "2" / std::filesystem::relative(entry.path(), folder / "1");
+    EXPECT_TRUE(read_file(entry.path()).value() == read_file(other).value()) << other;
+    ++compared;
+  }
+  EXPECT_GE(compared, 20);
+}
+
 TEST(ModelCommands, NameWhatTheyCantRead) {
   const TemporaryFolder folder;
   ProcessResult result = skullstation_cli({"model", "info", (folder / "none.h5").string()});

@@ -123,6 +123,20 @@ TEST(FaceEstimate, VariationsPointTheWayTheFactsGo) {
   EXPECT_EQ(face.variations.size(), static_cast<std::size_t>(model().tissue.mode_count()) + 1);
 }
 
+TEST(FaceEstimate, VariationsLieWhereFacesFittedAnewLie) {
+  const CaseSkull skull = case_of(everybody()[training + 2]);
+  FaceOptions options = coarse(TissueChoice::conditional);
+  const FaceEstimate face = estimate_face(model(), skull, options).value();
+  for (const FaceVariation& variation : face.variations) {
+    EXPECT_GT(variation.per_sd_mm.rowwise().norm().mean(), 0.02) << variation.name;
+    EXPECT_LT(variation.refit_gap_mm, 0.3) << variation.name;
+  }
+  options.variations = false;
+  const FaceEstimate alone = estimate_face(model(), skull, options).value();
+  EXPECT_TRUE(alone.variations.empty());
+  EXPECT_EQ(alone.head, face.head);
+}
+
 TEST(FaceEstimate, FollowsDepthsThatAreKnown) {
   const CaseSkull skull = case_of(everybody()[training]);
   const FaceEstimate before =

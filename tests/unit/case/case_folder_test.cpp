@@ -47,6 +47,8 @@ const Example& example() {
     e.source.input_sha256 = std::string(64, 'a');
     e.source.model_card = "Made of <balls>.";
     e.source.facts = face_options.facts;
+    e.source.ancestry = "northern <X>";
+    e.source.tissue = "depths foretold from the skull";
     e.source.program_version = "1.2.3";
     return e;
   }();
@@ -72,6 +74,18 @@ TEST(FaceVariants, AreThePapersGridAndLeanerAndFuller) {
   EXPECT_GT(variants[10].head.norm(), variants[9].head.norm());
 }
 
+TEST(FaceVariants, MayBeTheMeanAloneOrAFinerGrid) {
+  const std::vector<FaceVariant> alone = face_variants(example().face, 1);
+  ASSERT_EQ(alone.size(), 3U);
+  EXPECT_EQ(alone[0].name, "mean");
+  const std::vector<FaceVariant> fine = face_variants(example().face, 5);
+  ASSERT_EQ(fine.size(), 27U);
+  EXPECT_EQ(fine[0].name, "tissue 1 -2, tissue 2 -2");
+  EXPECT_EQ(fine[11].name, "tissue 1 -1");
+  EXPECT_EQ(fine[12].name, "mean");
+  EXPECT_EQ(fine[24].head, face_variants(example().face)[8].head);
+}
+
 TEST(CaseFolder, HoldsAllThatTheFormatNames) {
   const testing::TemporaryFolder folder;
   ASSERT_TRUE(write(folder / "case"));
@@ -86,6 +100,9 @@ TEST(CaseFolder, HoldsAllThatTheFormatNames) {
   EXPECT_EQ(json["input"]["sha256"], std::string(64, 'a'));
   EXPECT_EQ(json["facts"]["age_years"], 40.0);
   EXPECT_TRUE(json["facts"]["male"].is_null());
+  EXPECT_EQ(json["facts"]["ancestry"], "northern <X>");
+  EXPECT_EQ(json["tissue_from"]["source"], "depths foretold from the skull");
+  EXPECT_EQ(json["variations"].size(), 3U);
   EXPECT_EQ(json["tissue"].size(), 2U);
   EXPECT_EQ(json["warnings"].size(), 1U);
   const auto head = read_ply(folder / "case/head.ply");
@@ -106,9 +123,10 @@ TEST(CaseFolder, ReportSaysWhatTheFaceIsAndWhatItIsNot) {
   const testing::TemporaryFolder folder;
   ASSERT_TRUE(write(folder / "case"));
   const std::string report = read_file(folder / "case/report.html").value();
-  for (const char* words :
-       {"an investigative aid, not an identification", "78 % of the skull",
-        "Made of &lt;balls&gt;.", "40 years", "nasion", "1.2.3", "data:image/jpeg;base64,"}) {
+  for (const char* words : {"an investigative aid, not an identification", "78 % of the skull",
+                            "Made of &lt;balls&gt;.", "northern &lt;X&gt;", "It changes nothing",
+                            "depths foretold from the skull", "40 years", "nasion", "1.2.3",
+                            "data:image/jpeg;base64,"}) {
     EXPECT_NE(report.find(words), std::string::npos) << words;
   }
 }

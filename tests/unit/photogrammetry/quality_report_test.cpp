@@ -23,7 +23,7 @@ SessionReconstruction good_reconstruction() {
   mesh.triangles.resize(1, 3);
   mesh.triangles << 0, 1, 2;
   reconstruction.surface.coverage = {{3, 4, 12}, {0.2F, 0.2F, 0.25F}, {0.05F, 0.04F, 0.06F}, 68.0};
-  reconstruction.cameras.cameras = {{.id = "cam0", .width = 1600, .height = 1200}};
+  reconstruction.cameras.cameras = {{.id = "cam0", .width = 1600, .height = 1200, .params = {}}};
   PoseResult& poses = reconstruction.poses;
   poses.scale = ScaleSource::board;
   poses.scale_error_percent = 0.05;

@@ -52,6 +52,16 @@ Similarity3 some_pose() {
   return random_pose(random, 200.0);
 }
 
+TEST(SkullRegistration, AVeryLongFaceKeepsItsMandible) {
+  // Between this face's teeth and its chin an unbent cranium leaves room for a whole small
+  // mandible.
+  const Person long_face = PersonMaker(2.0, 0).make(draw_person(mix(5000, 1)), 0);
+  const auto fit = register_skull(skull_template(), long_face.skull, {.threads = 2});
+  ASSERT_TRUE(fit) << fit.error().message();
+  EXPECT_LT(fit->quality.facial.mean_mm, 0.8);
+  EXPECT_GT(fit->quality.mandible_observed_share, 0.8);
+}
+
 TEST(SkullRegistration, FindsAPersonsSkullInAnyPose) {
   const Similarity3 pose = some_pose();
   const auto fit = register_skull(skull_template(), moved(pose, person().skull), {.threads = 2});

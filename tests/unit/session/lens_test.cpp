@@ -27,6 +27,17 @@ TEST(Lens, ProjectsByTheFormulaOfTheOpencvModel) {
   EXPECT_NEAR(px.y(), 400.0 * y + 240.0, 1e-12);
 }
 
+TEST(Lens, DerivativeIsThatOfTheProjection) {
+  const Lens lens = typical();
+  const Eigen::Vector3d x(90.0, -60.0, 500.0);
+  const Eigen::Matrix<double, 2, 3> derivative = lens.project_derivative(x);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d d = 1e-3 * Eigen::Vector3d::Unit(axis);
+    const Eigen::Vector2d slope = (lens.project(x + d) - lens.project(x - d)) / 2e-3;
+    EXPECT_LT((derivative.col(axis) - slope).norm(), 1e-6) << axis;
+  }
+}
+
 TEST(Lens, PinholeHasNoDistortion) {
   const Lens lens = Lens::from_params(640, 480, LensModel::pinhole, {500.0, 400.0, 320.0, 240.0});
   EXPECT_TRUE(lens.project({0.2, -0.1, 2.0}).isApprox(Eigen::Vector2d(320.0 + 50.0, 240.0 - 20.0)));

@@ -1,4 +1,4 @@
-#include "reconstruction/photogrammetry/poses_pnp.h"
+#include "core/session/board_pose.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ TEST(FindBoard, GivesTheExactPoseForExactCorners) {
   scene.noise_px = 0.0;
   const auto truth = make_pose_scene(scene);
   for (std::size_t i = 0; i < truth.views.size(); ++i) {
-    const auto found = find_board(truth.views[i].corners, truth.board, *truth.cameras[0].lens);
+    const auto found = find_board_pose(truth.views[i].corners, truth.board, *truth.cameras[0].lens);
     ASSERT_TRUE(found) << truth.views[i].name;
     EXPECT_LT(found->rms_px, 1e-6);
     // The board lies on the table, shifted by (1.5, -1.1, 0).
@@ -39,7 +39,7 @@ TEST(FindBoard, ChoosesTheRightOneOfAPlanesTwoPoses) {
     }
     if (patch.size() < 9) continue;
     ++checked;
-    const auto found = find_board(patch, truth.board, *truth.cameras[0].lens);
+    const auto found = find_board_pose(patch, truth.board, *truth.cameras[0].lens);
     ASSERT_TRUE(found) << truth.views[i].name;
     EXPECT_LT(rotation_distance_deg(found->camera_from_board, truth.camera_from_table[i]), 0.01);
   }
@@ -49,14 +49,15 @@ TEST(FindBoard, ChoosesTheRightOneOfAPlanesTwoPoses) {
 TEST(FindBoard, GivesNothingForTooFewCornersOrALine) {
   const auto truth = make_pose_scene({});
   const std::vector<BoardCorner>& all = truth.views[0].corners;
-  EXPECT_FALSE(find_board({all.begin(), all.begin() + 5}, truth.board, *truth.cameras[0].lens));
+  EXPECT_FALSE(
+      find_board_pose({all.begin(), all.begin() + 5}, truth.board, *truth.cameras[0].lens));
   std::vector<BoardCorner> line;
   for (const BoardCorner& corner : all) {
     if (corner.id / 13 == all.front().id / 13) line.push_back(corner);
   }
   ASSERT_GE(line.size(), 6U);
-  EXPECT_FALSE(find_board(line, truth.board, *truth.cameras[0].lens));
-  EXPECT_FALSE(find_board({}, truth.board, *truth.cameras[0].lens));
+  EXPECT_FALSE(find_board_pose(line, truth.board, *truth.cameras[0].lens));
+  EXPECT_FALSE(find_board_pose({}, truth.board, *truth.cameras[0].lens));
 }
 
 }  // namespace

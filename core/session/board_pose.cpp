@@ -1,10 +1,11 @@
-#include "reconstruction/photogrammetry/poses_pnp.h"
+#include "core/session/board_pose.h"
 
 #include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 
 #include "core/linear_algebra.h"
+#include "core/root_mean_square.h"
 #include "core/session/board_homography.h"
 
 namespace skullstation {
@@ -21,19 +22,8 @@ Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   return m;
 }
 
-/// d px / d x_camera by central differences: the lens has no derivative of its own.
-Eigen::Matrix<double, 2, 3> projection_jacobian(const Lens& lens, const Eigen::Vector3d& x) {
-  Eigen::Matrix<double, 2, 3> jacobian;
-  const double step = 1e-4 * x.z();
-  for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector3d d = step * Eigen::Vector3d::Unit(axis);
-    jacobian.col(axis) = (lens.project(x + d) - lens.project(x - d)) / (2.0 * step);
-  }
-  return jacobian;
-}
-
 /// Nothing if the board would come to lie behind the camera.
-std::optional<BoardView> refined(const std::vector<BoardCorner>& corners, const CharucoBoard& board,
+std::optional<BoardPose> refined(const std::vector<BoardCorner>& corners, const CharucoBoard& board,
                                  const Lens& lens, Rigid3 pose) {
   constexpr int most_steps = 50;
   constexpr double huber_px = 1.0;
@@ -46,7 +36,7 @@ std::optional<BoardView> refined(const std::vector<BoardCorner>& corners, const 
       if (!(x.z() > board.square_mm)) return std::nullopt;
       const Eigen::Vector2d error = corner.position_px - lens.project(x);
       Matrix26 by_pose;
-      const Eigen::Matrix<double, 2, 3> by_point = projection_jacobian(lens, x);
+      const Eigen::Matrix<double, 2, 3> by_point = lens.project_derivative(x);
       by_pose << -by_point * cross_matrix(turned), by_point;
       const double weight = std::min(1.0, huber_px / std::max(error.norm(), 1e-12));
       normal += weight * by_pose.transpose() * by_pose;
@@ -72,7 +62,7 @@ std::optional<BoardView> refined(const std::vector<BoardCorner>& corners, const 
   }
   const double rms_px = root_mean_square(corner_errors_px(corners, board, lens, pose));
   if (!std::isfinite(rms_px)) return std::nullopt;
-  return BoardView{pose, rms_px};
+  return BoardPose{pose, rms_px};
 }
 
 /// The pose whose first two columns and translation the homography of the board's plane holds.
@@ -128,21 +118,15 @@ std::vector<double> corner_errors_px(const std::vector<BoardCorner>& corners,
   return errors;
 }
 
-double root_mean_square(const std::vector<double>& errors) {
-  double sum = 0.0;
-  for (const double error : errors) sum += error * error;
-  return errors.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(errors.size()));
-}
-
-std::optional<BoardView> find_board(const std::vector<BoardCorner>& corners,
-                                    const CharucoBoard& board, const Lens& lens) {
+std::optional<BoardPose> find_board_pose(const std::vector<BoardCorner>& corners,
+                                         const CharucoBoard& board, const Lens& lens) {
   const auto start = homography_pose(corners, board, lens);
   if (!start) return std::nullopt;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const BoardCorner& corner : corners) {
     middle += board.corner(corner.id) / static_cast<double>(corners.size());
   }
-  std::optional<BoardView> best;
+  std::optional<BoardPose> best;
   for (const Rigid3& pose : {*start, mirrored(*start, middle)}) {
     const auto view = refined(corners, board, lens, pose);
     if (view && (!best || view->rms_px < best->rms_px)) best = view;
