@@ -1,6 +1,7 @@
-// How far approximated faces lie from the true ones: phantoms that the model never saw, each method
-// beside the others, as Markdown tables (docs/faces.md). Usage:
-//   bench_faces [--model FILE] [--people 20] [--seed 5000] [--out FOLDER]
+// How far approximated faces lie from the true ones: phantoms that the model never saw, or subjects
+// (skull.ply and skin.ply, as `skullstation ct import` writes them), each method beside the others,
+// as Markdown tables (docs/faces.md). Usage:
+//   bench_faces [--model FILE] [--people 20 [--seed 5000] | --subject FOLDER ...] [--out FOLDER]
 //               [--morphs]
 // Depths are the model's population mean (the paper's method), foretold from the skull (the
 // default), the same with sex, age and body mass index known, and the person's own.
@@ -13,6 +14,7 @@
 #include <filesystem>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -22,6 +24,7 @@
 #include "reconstruction/approximation/face_error.h"
 #include "reconstruction/approximation/face_estimate.h"
 #include "reconstruction/io/ply.h"
+#include "reconstruction/mesh/flat_cuts.h"
 #include "reconstruction/phantom/person.h"
 #include "reconstruction/statistics/tissue_thickness.h"
 
@@ -34,8 +37,16 @@ struct Options {
   std::string model;
   int people = 20;
   std::uint64_t seed = 5000;
-  bool morphs = false;        ///< how far morph targets are from faces fitted anew
-  std::filesystem::path out;  ///< folder for the meshes; none if empty
+  std::vector<std::string> subjects;  ///< instead of phantoms
+  bool morphs = false;                ///< how far morph targets are from faces fitted anew
+  std::filesystem::path out;          ///< folder for the meshes; none if empty
+};
+
+/// Whose face is approximated, and the truth about it.
+struct Somebody {
+  TriangleMesh skull;
+  TriangleMesh skin;
+  std::optional<PersonFacts> facts;
 };
 
 struct Method {
@@ -50,9 +61,19 @@ constexpr Method methods[] = {
     {"and sex, age, BMI", "facts", TissueChoice::conditional, true},
     {"the person's own depths", "own", TissueChoice::measured, false}};
 
-PersonFacts facts_of(const Person& person) {
+Somebody phantom(const PersonMaker& maker, std::uint64_t seed) {
+  Person person = maker.make(draw_person(seed), 0);
   const PersonParameters& p = person.parameters;
-  return {p.sex == Sex::male ? 1.0 : 0.0, p.age_years, p.bmi};
+  return {std::move(person.skull), std::move(person.skin),
+          PersonFacts{p.sex == Sex::male ? 1.0 : 0.0, p.age_years, p.bmi}};
+}
+
+Result<Somebody> subject(const std::filesystem::path& folder) {
+  auto skull = read_ply(folder / "skull.ply");
+  if (!skull) return forward(skull);
+  const auto skin = read_ply(folder / "skin.ply");
+  if (!skin) return forward(skin);
+  return Somebody{*std::move(skull), opened_at_flat_cuts(*skin), std::nullopt};
 }
 
 /// The person's own depths over the fitted skull, which lies in `anatomical_from_person`.
@@ -84,31 +105,37 @@ Result<void> run(const Options& options) {
       load_model(options.model.empty() ? std::optional<std::filesystem::path>() : options.model);
   if (!source) return forward(source);
   const FaceModel& model = source->model;
-  fmt::print("{} people, seed {}; {}\n\n", options.people, options.seed, source->name);
+  fmt::print("{} people, {}; {}\n\n", options.people,
+             options.subjects.empty() ? fmt::format("seed {}", options.seed) : "subjects",
+             source->name);
   fmt::print(
       "| person | method | face mean mm | P95 | over bone mean | in 80 % band |\n"
       "|---|---|---|---|---|---|\n");
-  const PersonMaker maker(edge_mm, 0);
+  std::optional<PersonMaker> maker;
+  if (options.subjects.empty()) maker.emplace(edge_mm, 0);
   std::map<std::string, std::vector<FaceError>> errors;
   std::map<std::string, std::vector<double>> gaps_mm;
   double fit_s = 0.0;
   double face_s = 0.0;
   for (int i = 0; i < options.people; ++i) {
-    const Person person =
-        maker.make(draw_person(mix(options.seed, static_cast<std::uint64_t>(i))), 0);
+    const auto at = static_cast<std::size_t>(i);
+    const auto person = maker ? Result<Somebody>(phantom(*maker, mix(options.seed, at)))
+                              : subject(options.subjects[at]);
+    if (!person) return forward(person);
     const Seconds begin = Seconds::now();
-    const auto skull = fit_case_skull(model, person.skull);
+    const auto skull = fit_case_skull(model, person->skull);
     fit_s += (Seconds::now() - begin).processor;
     if (!skull) {
       fmt::print("| {} | {} |\n", i + 1, skull.error().message());
       continue;
     }
-    const TriangleMesh skin = moved(skull->anatomical_from_input, person.skin);
+    const TriangleMesh skin = moved(skull->anatomical_from_input, person->skin);
     for (const Method& method : methods) {
+      if (method.facts && !person->facts) continue;
       FaceOptions face_options;
       face_options.tissue = method.tissue;
       face_options.variations = options.morphs && &method == &methods[1];
-      if (method.facts) face_options.facts = facts_of(person);
+      if (method.facts) face_options.facts = *person->facts;
       if (method.tissue == TissueChoice::measured) {
         auto depths = own_depths(model, *skull, skin);
         if (!depths) return forward(depths);
@@ -143,6 +170,7 @@ Result<void> run(const Options& options) {
   for (const Method& method : methods) {
     FaceError mean;
     const auto& all = errors[method.name];
+    if (all.empty()) continue;
     const auto count = static_cast<double>(all.size());
     for (const FaceError& error : all) {
       mean.mean_mm += error.mean_mm / count;
@@ -179,7 +207,10 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "of the people");
   app.add_flag("--morphs", options.morphs, "compare morph targets with faces fitted anew");
   app.add_option("--out", options.out, "folder to write the meshes to");
+  app.add_option("--subject", options.subjects, "folders with skull.ply and skin.ply")
+      ->excludes("--people");
   CLI11_PARSE(app, argc, argv);
+  if (!options.subjects.empty()) options.people = static_cast<int>(options.subjects.size());
   if (const auto done = skullstation::run(options); !done) {
     fmt::print(stderr, "{}\n", done.error().message());
     return skullstation::exit_code(done.error().kind);

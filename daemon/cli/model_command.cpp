@@ -26,7 +26,7 @@ struct Population {
   std::vector<ModelSubject> subjects;
   Json sources = Json::array();   ///< name and hash of each that takes part
   Json failures = Json::array();  ///< name and reason of each that does not
-  std::string notes;              ///< the same for people
+  std::string notes;              ///< of failures and remarks, for people
 };
 
 Result<Population> population_of(const std::vector<SubjectFit>& fits, bool allow_failures) {
@@ -34,8 +34,12 @@ Result<Population> population_of(const std::vector<SubjectFit>& fits, bool allow
   for (const SubjectFit& fit : fits) {
     if (fit.failure.empty()) {
       population.subjects.push_back(fit.subject);
-      population.sources.push_back(
-          {{"name", fit.subject.name}, {"surfaces_sha256", fit.surfaces_sha256}});
+      population.sources.push_back({{"name", fit.subject.name},
+                                    {"surfaces_sha256", fit.surfaces_sha256},
+                                    {"remark", fit.remark}});
+      if (!fit.remark.empty()) {
+        population.notes += fmt::format("{}: {}\n", fit.subject.name, fit.remark);
+      }
     } else {
       population.failures.push_back({{"name", fit.subject.name}, {"reason", fit.failure}});
       population.notes += fmt::format("left out: {}: {}\n", fit.subject.name, fit.failure);

@@ -173,6 +173,41 @@ Result<SubjectFit> fitted_subject(const fs::path& folder, const SkullTemplate& s
   return fit;
 }
 
+/// What was not observed of a bone, and so is the other subjects' and not this one's.
+std::string what_is_missing(const SkullTemplate& skull, const ModelSubject& subject) {
+  constexpr double enough = 0.7;
+  std::string missing;
+  for (const auto& [bone, name] :
+       {std::pair(SkullBone::cranium, "cranium"), {SkullBone::mandible, "mandible"}}) {
+    double outer = 0.0;
+    double seen = 0.0;
+    for (int v = 0; v < skull.boundary_count; ++v) {
+      const auto at = static_cast<std::size_t>(v);
+      if (!skull.outer[at] || bone_of(skull.region[at]) != bone) continue;
+      outer += 1.0;
+      seen += subject.skull_observed[at] ? 1.0 : 0.0;
+    }
+    if (outer == 0.0 || seen >= enough * outer) continue;
+    missing += fmt::format("{}of the {} {:.0f} % were observed", missing.empty() ? "" : ", ", name,
+                           100.0 * seen / outer);
+  }
+  return missing.empty() ? "" : missing + "; the rest follows from the others";
+}
+
+/// Nobody may count twice, as surfaces or as fits.
+void name_duplicates(std::vector<SubjectFit>& fits) {
+  constexpr double same_mm = 0.02;
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    for (std::size_t j = 0; j < i && fits[i].failure.empty(); ++j) {
+      if (!fits[j].failure.empty()) continue;
+      const bool again =
+          fits[i].surfaces_sha256 == fits[j].surfaces_sha256 ||
+          (fits[i].subject.skull - fits[j].subject.skull).rowwise().norm().mean() < same_mm;
+      if (again) fits[i].failure = fmt::format("is {} again", fits[j].subject.name);
+    }
+  }
+}
+
 }  // namespace
 
 Result<std::vector<SubjectFit>> fit_subjects(const fs::path& subjects, const SkullTemplate& skull,
@@ -212,7 +247,15 @@ Result<std::vector<SubjectFit>> fit_subjects(const fs::path& subjects, const Sku
     if (!attempt) return forward(attempt);
     fits.push_back(*std::move(attempt));
   }
+  judge_subjects(skull, fits);
   return fits;
+}
+
+void judge_subjects(const SkullTemplate& skull, std::vector<SubjectFit>& fits) {
+  name_duplicates(fits);
+  for (SubjectFit& fit : fits) {
+    if (fit.failure.empty()) fit.remark = what_is_missing(skull, fit.subject);
+  }
 }
 
 }  // namespace skullstation

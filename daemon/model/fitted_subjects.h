@@ -23,17 +23,23 @@ struct SubjectFit {
   ModelSubject subject;
   std::string surfaces_sha256;  ///< of skull.ply and skin.ply
   bool from_before = false;     ///< taken from the fits folder
-  std::string failure;          ///< why there is no fit; empty: there is one
+  std::string failure;          ///< why there is no fit that counts; empty: there is one
+  std::string remark;           ///< what has to be said of one that counts; empty: nothing
 };
 
 /// Fits both templates to every subject folder (skull.ply, skin.ply, subject.json) below `subjects`
 /// in the order of their names, and measures the tissue. What was fitted before from the same
 /// surfaces, templates and program version is taken from `fits`. A subject that can't be fitted is
-/// reported in its `failure`. Fails where `subjects` holds no subject folder or `fits` can't be
-/// written, and with `cancelled` on request.
+/// reported in its `failure`, and so is one that is another subject again; of one that lacks a bone
+/// or much of it the `remark` says so. Fails where `subjects` holds no subject folder or `fits`
+/// can't be written, and with `cancelled` on request.
 Result<std::vector<SubjectFit>> fit_subjects(const std::filesystem::path& subjects,
                                              const SkullTemplate& skull, const HeadTemplate& head,
                                              const SubjectFitOptions& options,
                                              const Progress& progress = {});
+
+/// What fit_subjects says last: whoever is another one again does not count, and of the others is
+/// said what was not observed.
+void judge_subjects(const SkullTemplate& skull, std::vector<SubjectFit>& fits);
 
 }  // namespace skullstation

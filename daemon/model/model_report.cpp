@@ -152,6 +152,10 @@ Result<Report> model_report(const ModelSource& source, const ReportPictureOption
                       fmt::format("{:.2f} standard deviations", band.factor));
   }
   report.add(Table{rows});
+  if (!source.remarks.empty()) {
+    report.add(Heading{"Subjects of whom something has to be said"});
+    report.add(Table{source.remarks});
+  }
   return report;
 }
 

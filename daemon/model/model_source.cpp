@@ -1,6 +1,7 @@
 #include "daemon/model/model_source.h"
 
 #include <nlohmann/json.hpp>
+#include <tuple>
 #include <utility>
 
 #include "core/file.h"
@@ -18,6 +19,26 @@ constexpr const char* default_name = "default model";
 
 std::string default_model() { return {skullstation_default_model, skullstation_default_model_end}; }
 
+/// Whatever the file's provenance tells in the form that `model build` writes.
+void read_provenance(ModelSource& source) {
+  const auto provenance = nlohmann::json::parse(source.model.provenance, nullptr, false);
+  if (!provenance.is_object()) return;
+  const auto text = [](const nlohmann::json& object, const char* key) {
+    const auto found = object.find(key);
+    return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  source.card = text(provenance, "card");
+  for (const auto& [list, key, before] :
+       {std::tuple("left_out", "reason", "left out: "), {"subjects", "remark", ""}}) {
+    const auto found = provenance.find(list);
+    if (found == provenance.end() || !found->is_array()) continue;
+    for (const auto& subject : *found) {
+      if (!subject.is_object() || text(subject, key).empty()) continue;
+      source.remarks.emplace_back(text(subject, "name"), before + text(subject, key));
+    }
+  }
+}
+
 }  // namespace
 
 Result<ModelSource> load_model(const std::optional<std::filesystem::path>& file) {
@@ -29,8 +50,7 @@ Result<ModelSource> load_model(const std::optional<std::filesystem::path>& file)
   auto model = decode_model(*std::move(bytes), file ? file->string() : default_name);
   if (!model) return forward(model);
   source.model = *std::move(model);
-  const auto provenance = nlohmann::json::parse(source.model.provenance, nullptr, false);
-  if (provenance.is_object()) source.card = provenance.value("card", std::string());
+  read_provenance(source);
   return source;
 }
 

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/result.h"
 #include "reconstruction/statistics/face_model.h"
@@ -16,6 +18,8 @@ struct ModelSource {
   std::string name;  ///< of the file
   std::string sha256;
   std::string card;  ///< who it was made from, in plain words
+  /// Of subjects that were left out, or lack something: name, and what has to be said.
+  std::vector<std::pair<std::string, std::string>> remarks;
 };
 
 /// The model in `file`, or without a file the one that is built into the program. Fails as

@@ -49,6 +49,25 @@ TEST(FitSubjects, NamesEachThatCantBeFittedAndWhy) {
   EXPECT_EQ((*done)[3].subject.name, "d_damaged");
 }
 
+TEST(JudgeSubjects, NobodyCountsTwiceAndWhatIsMissingIsSaid) {
+  const SkullTemplate& skull = testing::skull_template();
+  std::vector<SubjectFit> fits(4);
+  for (int i = 0; i < 4; ++i) {
+    fits[static_cast<std::size_t>(i)].subject = testing::person(i);
+    fits[static_cast<std::size_t>(i)].surfaces_sha256 = std::to_string(i);
+  }
+  fits[2].surfaces_sha256 = "0";                  // the same files
+  fits[3].subject.skull = fits[1].subject.skull;  // other files of the same surfaces
+  fits[1].subject.skull_observed.assign(fits[1].subject.skull_observed.size(), false);
+  judge_subjects(skull, fits);
+  EXPECT_EQ(fits[0].failure, "");
+  EXPECT_EQ(fits[0].remark, "");
+  EXPECT_EQ(fits[1].failure, "");
+  EXPECT_THAT(fits[1].remark, AllOf(HasSubstr("0 % were observed"), HasSubstr("the others")));
+  EXPECT_EQ(fits[2].failure, "is P0 again");
+  EXPECT_EQ(fits[3].failure, "is P1 again");
+}
+
 TEST(FitSubjects, RefusesAFolderWithoutSubjects) {
   const TemporaryFolder folder;
   ASSERT_TRUE(make_writable_folder(folder / "subjects/notes"));

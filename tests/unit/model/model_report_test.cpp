@@ -25,6 +25,7 @@ const ModelSource& balls() {
     made.name = "balls.h5";
     made.sha256 = std::string(64, 'b');
     made.card = "Made of <balls>.";
+    made.remarks = {{"person 7", "left out: is person 3 again"}};
     return made;
   }();
   return source;
@@ -36,9 +37,10 @@ TEST(ModelReport, ShowsModesTissueAndWhoTheSubjectsWere) {
   const auto report = model_report(balls(), small);
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_THAT(html_page(*report),
-              AllOf(HasSubstr("Made of &lt;balls&gt;."), HasSubstr("mode 1, -2 SD"),
-                    HasSubstr("mode 2, +2 SD"), HasSubstr("subjects measured, 0 to 20"),
-                    HasSubstr("balls.h5"), HasSubstr("<svg"), Not(HasSubstr("http"))));
+              AllOf(HasSubstr("Made of &lt;balls&gt;."), HasSubstr("person 3 again"),
+                    HasSubstr("mode 1, -2 SD"), HasSubstr("mode 2, +2 SD"),
+                    HasSubstr("subjects measured, 0 to 20"), HasSubstr("balls.h5"),
+                    HasSubstr("<svg"), Not(HasSubstr("http"))));
 }
 
 TEST(ModelReport, StopsWhenAsked) {
