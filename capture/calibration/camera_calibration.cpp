@@ -117,6 +117,7 @@ double search_focal_length(std::vector<ActiveView>& views, const CharucoBoard& b
 void choose_better_poses(std::vector<ActiveView>& views, const CharucoBoard& board,
                          const Lens& lens) {
   std::vector<double> rms_px;
+  rms_px.reserve(views.size());
   for (const ActiveView& view : views) {
     rms_px.push_back(
         root_mean_square(corner_errors_px(view.corners, board, lens, view.camera_from_board)));
@@ -235,8 +236,8 @@ double coverage_of(const std::vector<ActiveView>& views, int width, int height) 
 
 Result<void> check_input(const std::vector<CalibrationView>& views, const CharucoBoard& board,
                          int width, int height, const CameraCalibrationOptions& options) {
-  if (const auto valid = options.validate(); !valid) return valid;
-  if (const auto valid = board.validate(); !valid) return valid;
+  if (const auto valid = options.validate(); !valid) return forward(valid);
+  if (const auto valid = board.validate(); !valid) return forward(valid);
   if (width <= 0 || height <= 0) {
     return fail(ErrorKind::bad_input, subject, fmt::format("images of {} x {} px", width, height));
   }

@@ -119,6 +119,7 @@ std::vector<FaceVariant> face_variants(const FaceEstimate& face, int steps) {
   }
   constexpr double reach_sd = FaceVariation::reach_sd;
   std::vector<double> sds;
+  sds.reserve(static_cast<std::size_t>(steps));
   for (int i = 0; i < steps; ++i) {
     sds.push_back(steps == 1 ? 0.0 : reach_sd * (2.0 * i / (steps - 1) - 1.0));
   }
@@ -152,10 +153,10 @@ Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
                                const FaceEstimate& face, const CaseSource& source,
                                const fs::path& folder, const ReportPictureOptions& picture_options,
                                const Progress& progress) {
-  if (const auto free = check_new_folder(folder); !free) return free;
+  if (const auto free = check_new_folder(folder); !free) return forward(free);
   StagedFolder staged(folder);
-  if (const auto made = staged.make(); !made) return made;
-  if (const auto made = make_writable_folder(staged / "variants"); !made) return made;
+  if (const auto made = staged.make(); !made) return forward(made);
+  if (const auto made = make_writable_folder(staged / "variants"); !made) return forward(made);
   const TriangleMesh bone =
       surface_of(model.skull_template, skull.vertices.topRows(model.skull_template.boundary_count));
   const TriangleMesh head = head_mesh(model, face.head);
@@ -179,7 +180,7 @@ Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
     if (const auto written =
             write_glb(mesh, staged / "variants" / (file_name(variant.name) + ".glb"));
         !written) {
-      return written;
+      return forward(written);
     }
     variant_heads.emplace_back(variant.name, mesh);
   }
@@ -213,7 +214,7 @@ Result<void> write_case_folder(const FaceModel& model, const CaseSkull& skull,
   for (const auto& [name, picture] : pictures.face) {
     const fs::path file = staged / ("preview_" + file_name(name) + ".png");
     if (const auto written = write_file_durably(file, encode_png(picture)); !written) {
-      return written;
+      return forward(written);
     }
   }
   return staged.put_in_place();

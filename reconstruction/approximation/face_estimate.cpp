@@ -231,8 +231,8 @@ double factor_of(const std::vector<BandFactor>& bands, std::string_view region) 
 }  // namespace
 
 Result<void> FaceOptions::validate() const {
-  if (const auto sound = facts.validate(); !sound) return sound;
-  if (const auto sound = spheres.validate(); !sound) return sound;
+  if (const auto sound = facts.validate(); !sound) return forward(sound);
+  if (const auto sound = spheres.validate(); !sound) return forward(sound);
   if (rounds < 1) return fail(ErrorKind::bad_input, "face, rounds", "must be at least 1");
   for (const KnownDepth& known : known_depths) {
     if (!(known.depth_mm > 0.0) || !(known.depth_mm < 80.0) || !(known.sd_mm > 0.0)) {

@@ -260,7 +260,8 @@ Result<void> gate_views(Work& work, const CharucoBoard& board, const BoardPoseOp
       dropped = true;
     }
     if (!dropped) return {};
-    if (const auto enough = check_count(work, result, board, options); !enough) return enough;
+    if (const auto enough = check_count(work, result, board, options); !enough)
+      return forward(enough);
     if (!adjust_views(work.bundle, board, std::nullopt)) {
       return tl::unexpected<Error>(unsolvable());
     }
@@ -376,8 +377,8 @@ Result<void> check_given_scale(const std::vector<PoseObservation>& views,
 Result<void> check_input(const std::vector<PoseObservation>& views,
                          const std::vector<PoseCamera>& cameras, const CharucoBoard& board,
                          const BoardPoseOptions& options) {
-  if (const auto valid = options.validate(); !valid) return valid;
-  if (const auto valid = board.validate(); !valid) return valid;
+  if (const auto valid = options.validate(); !valid) return forward(valid);
+  if (const auto valid = board.validate(); !valid) return forward(valid);
   for (const PoseObservation& view : views) {
     if (view.camera < 0 || std::cmp_greater_equal(view.camera, cameras.size())) {
       return fail(ErrorKind::bad_input, view.name, "was taken by a camera that is not listed");
