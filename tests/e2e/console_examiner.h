@@ -29,6 +29,9 @@ class Examiner {
  public:
   explicit Examiner(std::size_t cases_wanted) : cases_wanted_(cases_wanted) {}
 
+  /// Are there cases still to be scanned?
+  bool wants_more() const { return standing_ < cases_wanted_; }
+
   bool connect(std::uint16_t port) { return user_.connect(port); }
   bool sign_in(const std::string& path, const nlohmann::json& body) {
     return user_.sign_in(path, body);
