@@ -26,6 +26,7 @@
 #include "reconstruction/io/ply.h"
 #include "reconstruction/mesh/flat_cuts.h"
 #include "reconstruction/phantom/person.h"
+#include "reconstruction/registration/similarity_fit.h"
 #include "reconstruction/statistics/tissue_thickness.h"
 
 namespace skullstation {
@@ -91,13 +92,6 @@ Result<Eigen::VectorXd> own_depths(const FaceModel& model, const CaseSkull& skul
     }
   }
   return depths;
-}
-
-TriangleMesh moved(const Similarity3& motion, TriangleMesh mesh) {
-  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
-    mesh.vertices.row(v) = (motion * mesh.vertices.row(v).transpose()).transpose();
-  }
-  return mesh;
 }
 
 Result<void> run(const Options& options) {

@@ -17,6 +17,7 @@
 #include "reconstruction/approximation/face_estimate.h"
 #include "reconstruction/distance/triangle_bvh.h"
 #include "reconstruction/registration/point_tree.h"
+#include "reconstruction/registration/similarity_fit.h"
 
 namespace skullstation {
 namespace {
@@ -44,11 +45,7 @@ Result<JudgedFace> judged_face(const FaceModel& model, const Person& person, Rem
   options.variations = false;
   const auto face = estimate_face(model, *skull, options);
   if (!face) return forward(face);
-  TriangleMesh skin = person.skin;
-  for (Eigen::Index v = 0; v < skin.vertices.rows(); ++v) {
-    skin.vertices.row(v) =
-        (skull->anatomical_from_input * skin.vertices.row(v).transpose()).transpose();
-  }
+  const TriangleMesh skin = moved(skull->anatomical_from_input, person.skin);
   const TriangleBvh truth(skin);
   const PointTree bone(skull->vertices.topRows(model.skull_template.boundary_count));
   JudgedFace judged{Eigen::VectorXd(face->head.rows()), face->sd_mm, face->band_mm, {}};
@@ -78,12 +75,12 @@ struct PartMeans {
     whole_sd_mm += whole.sd_mm[v];
     in_band += face.error_mm[v] <= face.band_mm[v] ? 1.0 : 0.0;
   }
-  void print(Remains remains, const char* part) const {
+  /// \param all count of the vertices of all parts
+  void print(Remains remains, const char* part, double all) const {
     fmt::print("| {} | {} | {:.0f} % | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.0f} % |\n",
-               to_string(remains), part, 100.0 * share, error_mm / count, whole_error_mm / count,
-               sd_mm / count, whole_sd_mm / count, 100.0 * in_band / count);
+               to_string(remains), part, 100.0 * count / all, error_mm / count,
+               whole_error_mm / count, sd_mm / count, whole_sd_mm / count, 100.0 * in_band / count);
   }
-  double share = 0.0;
 };
 
 Result<void> run(const Options& options) {
@@ -124,9 +121,8 @@ Result<void> run(const Options& options) {
       options.people, options.seed, source->name, failed);
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     const double all = parts[k][0].count + parts[k][1].count;
-    for (PartMeans& part : parts[k]) part.share = part.count / all;
-    parts[k][1].print(kinds[k], "bone observed");
-    parts[k][0].print(kinds[k], "bone missing");
+    parts[k][1].print(kinds[k], "bone observed", all);
+    parts[k][0].print(kinds[k], "bone missing", all);
   }
   return {};
 }

@@ -24,6 +24,7 @@
 #include "reconstruction/phantom/person.h"
 #include "reconstruction/registration/head_led_by_skull.h"
 #include "reconstruction/registration/head_registration.h"
+#include "reconstruction/registration/similarity_fit.h"
 #include "reconstruction/registration/skull_registration.h"
 #include "reconstruction/registration/surface_pose.h"
 #include "reconstruction/templates/template_file.h"
@@ -40,14 +41,6 @@ Similarity3 random_pose(Random& random) {
           .normalized();
   for (int c = 0; c < 3; ++c) pose.translation[c] = random.uniform(-300.0, 300.0);
   return pose;
-}
-
-TriangleMesh moved(const Similarity3& transform, TriangleMesh mesh) {
-  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
-    mesh.vertices.row(v) = (transform * mesh.vertices.row(v).transpose()).transpose();
-  }
-  mesh.normals.resize(0, 3);
-  return mesh;
 }
 
 /// Mean over people of what each stage cost.

@@ -70,7 +70,7 @@ Report case_report(const FaceModel& model, const CaseSkull& skull, const FaceEst
     report.add(Warning{
         "ancestry",
         fmt::format("Told as \"{}\" and written down. It changes nothing: the model's people have "
-                    "none recorded, and published depths do not support one that counts.",
+                    "none recorded, and published depths show no effect that counts.",
                     source.ancestry)});
   }
   report.add(Warning{"model", source.model_card});
@@ -87,9 +87,8 @@ Report case_report(const FaceModel& model, const CaseSkull& skull, const FaceEst
   report.add(Heading{"Faces that are as plausible"});
   report.add(Paragraph{
       "Up to two standard deviations along the ways in which the soft tissue of the model's "
-      "subjects "
-      "differs most, and leaner and fuller where the body mass index is not known. Show them "
-      "together: whoever knew the person may recognise one and not another."});
+      "subjects differs most, and leaner and fuller where the body mass index is not known. Show "
+      "them together: whoever knew the person may recognise one and not another."});
   report.add(Pictures{pictures.variants});
 
   report.add(Heading{"How it was made"});

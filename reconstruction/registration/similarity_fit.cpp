@@ -63,4 +63,12 @@ Result<Similarity3> fit_similarity(const Points3& source, const Points3& target,
   return fit;
 }
 
+TriangleMesh moved(const Similarity3& transform, TriangleMesh mesh) {
+  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
+    mesh.vertices.row(v) = (transform * mesh.vertices.row(v).transpose()).transpose();
+  }
+  mesh.normals = vertex_normals(mesh);
+  return mesh;
+}
+
 }  // namespace skullstation

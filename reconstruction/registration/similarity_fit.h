@@ -21,4 +21,7 @@ enum class FitScale {
 Result<Similarity3> fit_similarity(const Points3& source, const Points3& target,
                                    const Eigen::VectorXd& weights, FitScale scale);
 
+/// The mesh there, with normals.
+TriangleMesh moved(const Similarity3& transform, TriangleMesh mesh);
+
 }  // namespace skullstation

@@ -50,8 +50,8 @@ constexpr Level kLevels[] = {
 };
 /// Of the cranium alone, before the mandible is looked for.
 constexpr Level kCraniumLevels[] = {
-    {"", 1e6, 1.0, {20.0, 45.0, 8.0}, 0.0, Search::far, 2},
-    {"", 1e5, 1.0, {15.0, 45.0, 6.0}, 0.0, Search::far, 3},
+    {"cranium, far", 1e6, 1.0, {20.0, 45.0, 8.0}, 0.0, Search::far, 2},
+    {"cranium, far, soft", 1e5, 1.0, {15.0, 45.0, 6.0}, 0.0, Search::far, 3},
 };
 constexpr double kPartsSmooth_mm4 = 1e6;
 constexpr PairLimits kPartLimits{5.0, 45.0};
@@ -99,24 +99,16 @@ class Fit {
     begin_stage();
     PartAlignment parts = align_cranium(skull_, surface, input_);
     place(unplaced, parts);
-    SkullPairs pairs;
-    double move = 0.0;
-    for (const Level& level : kCraniumLevels) {
-      for (int iteration = 0; iteration < level.iterations; ++iteration) {
-        pairs = pairs_of(level);
-        move = deform(rest_, pairs, level.smooth_mm4, level.volume, iteration == 0);
-        rest_ = state_.vertices;
-      }
-    }
-    end_stage("cranium", 1, pairs, move);
+    end_stage("cranium", 1, {}, 0.0);
+    for (const Level& level : kCraniumLevels) run(level);
 
     begin_stage();
     find_mandible(skull_, surface, state_.surface.vertices, input_, parts);
     align_regions(skull_, surface, input_, options_.threads, parts);
     place(unplaced, parts);
     mandible_found_ = parts.mandible_found;
-    pairs = part_pairs(state_, parts, input_, kPartLimits, options_.threads);
-    move = deform(rest_, pairs, kPartsSmooth_mm4, 1.0, true);
+    const SkullPairs pairs = part_pairs(state_, parts, input_, kPartLimits, options_.threads);
+    const double move = deform(rest_, pairs, kPartsSmooth_mm4, 1.0, true);
     end_stage("parts", 1, pairs, move);
     return parts;
   }
@@ -295,14 +287,6 @@ class Fit {
   double began_s_ = 0.0;
 };
 
-TriangleMesh moved(TriangleMesh mesh, const Similarity3& transform) {
-  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
-    mesh.vertices.row(v) = (transform * mesh.vertices.row(v).transpose()).transpose();
-  }
-  mesh.normals = vertex_normals(mesh);
-  return mesh;
-}
-
 }  // namespace
 
 Result<void> SkullRegistrationOptions::validate() const {
@@ -337,7 +321,7 @@ Result<FittedSkull> register_skull(const SkullTemplate& skull, const TriangleMes
 
   progress.report(0.1, "parts");
   auto surface =
-      InputSurface::make(moved(input, frame.inverse()), kSampleSpacing_mm, options.threads);
+      InputSurface::make(moved(frame.inverse(), input), kSampleSpacing_mm, options.threads);
   if (!surface) return forward(surface);
   Fit fit(skull, pose.scale / frame.scale, *surface, options);
   const PartAlignment parts = fit.follow_parts();

@@ -6,6 +6,7 @@
 #include "core/transform.h"
 #include "core/triangle_mesh.h"
 #include "reconstruction/phantom/canonical_skull.h"
+#include "reconstruction/registration/similarity_fit.h"
 
 namespace skullstation {
 
@@ -23,14 +24,6 @@ inline Similarity3 random_pose(Random& random, double reach_mm) {
           .normalized();
   for (int c = 0; c < 3; ++c) pose.translation[c] = random.uniform(-reach_mm, reach_mm);
   return pose;
-}
-
-inline TriangleMesh moved(const Similarity3& transform, TriangleMesh mesh) {
-  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
-    mesh.vertices.row(v) = transform * mesh.vertices.row(v).transpose();
-  }
-  mesh.normals.resize(0, 3);
-  return mesh;
 }
 
 /// What is left when everything beyond a plane with the given normal is broken off, so that
