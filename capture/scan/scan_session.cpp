@@ -288,9 +288,12 @@ Result<Frame> Scan::grab(const ScanCamera& camera, Instant not_before) {
   Result<Frame> frame =
       camera.camera.frame_after(not_before, options_.frame_timeout, progress_.stop);
   if (frame || frame.error().kind != ErrorKind::hardware) return frame;
-  if (!camera.camera.reopen()) return frame;  // the first error says what happened
-  return camera.camera.frame_after(std::max(not_before, station_.clock.now()),
-                                   options_.frame_timeout, progress_.stop);
+  if (camera.camera.reopen()) {  // else the first error says what happened
+    frame = camera.camera.frame_after(std::max(not_before, station_.clock.now()),
+                                      options_.frame_timeout, progress_.stop);
+  }
+  if (frame) return frame;
+  return forward(fmt::format("camera \"{}\"", camera.id), frame);
 }
 
 Result<void> Scan::check_interlock() const {

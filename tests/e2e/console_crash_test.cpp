@@ -27,6 +27,7 @@
 #include "tests/support/console_user.h"
 #include "tests/support/process.h"
 #include "tests/support/small_disk.h"
+#include "tests/support/station_client.h"
 #include "tests/support/steps.h"
 #include "tests/support/temporary_folder.h"
 

@@ -20,6 +20,7 @@
 #include "tests/e2e/small_station.h"
 #include "tests/support/console_user.h"
 #include "tests/support/process.h"
+#include "tests/support/station_client.h"
 #include "tests/support/steps.h"
 #include "tests/support/temporary_folder.h"
 
@@ -33,13 +34,6 @@ using skullstation::testing::Medium;
 using skullstation::testing::Process;
 using skullstation::testing::TemporaryFolder;
 using ::testing::HasSubstr;
-
-sockaddr_un address_of(const fs::path& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
-  return address;
-}
 
 class Daemon : public ::testing::Test {
  protected:
@@ -62,19 +56,8 @@ class Daemon : public ::testing::Test {
   fs::path storage() const { return folder_ / "store"; }
   void start() { daemon_ = std::make_unique<Process>(command()); }
 
-  /// The answer to a line; null if nobody answers.
   json ask(const std::string& line) const {
-    const int client = ::socket(AF_UNIX, SOCK_STREAM, 0);
-    const sockaddr_un address = address_of(storage() / "control");
-    std::string text;
-    if (::connect(client, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
-      const std::string sent = line + "\n";
-      static_cast<void>(!::send(client, sent.data(), sent.size(), MSG_NOSIGNAL));
-      char c = 0;
-      while (::read(client, &c, 1) == 1) text += c;
-    }
-    ::close(client);
-    return json::parse(text, nullptr, false);
+    return skullstation::testing::ask_station(storage() / "control", line);
   }
   std::string state() const {
     const json status = ask("status");
@@ -393,7 +376,9 @@ TEST_F(Daemon, TellsSystemdThatItIsReadyAndAlive) {
   configure();
   const fs::path notify = folder_ / "notify";
   const int socket = ::socket(AF_UNIX, SOCK_DGRAM, 0);
-  const sockaddr_un address = address_of(notify);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, notify.c_str(), sizeof address.sun_path - 1);
   ASSERT_EQ(::bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
   auto words = command();
   words.insert(words.begin(), {"/usr/bin/env", "NOTIFY_SOCKET=" + notify.string()});

@@ -17,6 +17,7 @@
 #include "core/random.h"
 #include "tests/support/process.h"
 #include "tests/support/small_disk.h"
+#include "tests/support/station_client.h"
 #include "tests/support/steps.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,10 +1,18 @@
 #include "tests/hardware_lab/kernel_trace.h"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <filesystem>
+#include <optional>
 #include <regex>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 
 #include "tests/hardware_lab/kernel_file.h"
 
@@ -13,9 +21,8 @@ namespace {
 
 const std::filesystem::path tracing = "/sys/kernel/tracing";
 
-}  // namespace
-
-KernelTrace::KernelTrace(const std::string& event) {
+/// Empties the record and lets it begin.
+void record(const std::string& event) {
   write_kernel_file(tracing / "trace_clock", "mono");  // empties the record, too
   write_kernel_file(tracing / "buffer_size_kb", "8192");
   // An event stays enabled for good: enabling changes the kernel's code, which the emulator that
@@ -25,6 +32,19 @@ KernelTrace::KernelTrace(const std::string& event) {
   write_kernel_file(tracing / "tracing_on", "1");
 }
 
+std::optional<TraceEvent> parse_event(const std::string& line) {
+  static const std::regex entry(" (\\d+)\\.(\\d{6}): (\\w+): (.*)");
+  std::smatch match;
+  if (!std::regex_search(line, match, entry)) return std::nullopt;
+  return TraceEvent{Instant(std::chrono::seconds(std::stoll(match[1])) +
+                            std::chrono::microseconds(std::stoll(match[2]))),
+                    match[3], match[4]};
+}
+
+}  // namespace
+
+KernelTrace::KernelTrace(const std::string& event) { record(event); }
+
 KernelTrace::~KernelTrace() { write_kernel_file(tracing / "tracing_on", "0"); }
 
 void KernelTrace::mark(const std::string& text) {
@@ -33,7 +53,6 @@ void KernelTrace::mark(const std::string& text) {
 
 std::vector<TraceEvent> KernelTrace::events() const {
   static const std::regex counts("entries-in-buffer/entries-written: (\\d+)/(\\d+)");
-  static const std::regex entry(" (\\d+)\\.(\\d{6}): (\\w+): (.*)");
 
   std::istringstream text(read_kernel_file(tracing / "trace"));
   std::vector<TraceEvent> events;
@@ -42,12 +61,37 @@ std::vector<TraceEvent> KernelTrace::events() const {
     if (std::regex_search(line, match, counts) && match[1] != match[2]) {
       throw std::runtime_error("the kernel's trace is incomplete: " + line);
     }
-    if (std::regex_search(line, match, entry)) {
-      events.push_back({Instant(std::chrono::seconds(std::stoll(match[1])) +
-                                std::chrono::microseconds(std::stoll(match[2]))),
-                        match[3], match[4]});
+    if (auto event = parse_event(line)) events.push_back(*std::move(event));
+  }
+  return events;
+}
+
+LiveKernelTrace::LiveKernelTrace(const std::string& event)
+    : pipe_(::open((tracing / "trace_pipe").c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {
+  if (pipe_ < 0) throw std::system_error(errno, std::generic_category(), "trace_pipe");
+  record(event);
+}
+
+LiveKernelTrace::~LiveKernelTrace() {
+  ::close(pipe_);
+  write_kernel_file(tracing / "tracing_on", "0");
+}
+
+std::vector<TraceEvent> LiveKernelTrace::next(std::chrono::milliseconds timeout) {
+  pollfd waiting{pipe_, POLLIN, 0};
+  std::vector<TraceEvent> events;
+  if (::poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) return events;
+  std::array<char, 4096> part;
+  for (ssize_t read = 0; (read = ::read(pipe_, part.data(), part.size())) > 0;) {
+    rest_.append(part.data(), static_cast<std::size_t>(read));
+  }
+  std::size_t begin = 0;
+  for (std::size_t end = 0; (end = rest_.find('\n', begin)) != std::string::npos; begin = end + 1) {
+    if (auto event = parse_event(rest_.substr(begin, end - begin))) {
+      events.push_back(*std::move(event));
     }
   }
+  rest_.erase(0, begin);
   return events;
 }
 

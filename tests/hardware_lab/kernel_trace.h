@@ -33,6 +33,23 @@ class KernelTrace {
   std::vector<TraceEvent> events() const;
 };
 
+/// The kernel's events while they happen, for whoever has to answer them: takes them out of the
+/// record, so not beside a KernelTrace.
+class LiveKernelTrace {
+ public:
+  explicit LiveKernelTrace(const std::string& event);
+  ~LiveKernelTrace();
+  LiveKernelTrace(const LiveKernelTrace&) = delete;
+  LiveKernelTrace& operator=(const LiveKernelTrace&) = delete;
+
+  /// What has happened since the last call; waits for it, but no longer than this.
+  std::vector<TraceEvent> next(std::chrono::milliseconds timeout);
+
+ private:
+  int pipe_;
+  std::string rest_;  ///< an event that has not come whole yet
+};
+
 /// A GPIO line as it was driven by software.
 struct LineChange {
   Instant at;

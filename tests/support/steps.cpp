@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <thread>
+#include <chrono>
 
 #include "core/file.h"
 #include "tests/support/process.h"
@@ -51,15 +51,6 @@ Result<Case> scan_fake_case(CaseStore& store, const std::string& number, const S
   }
   if (auto saved = store.save_scan(begun->id, chain); !saved) return forward(saved);
   return store.case_of(begun->id);
-}
-
-bool comes_true(const std::function<bool()>& condition, std::chrono::seconds time) {
-  const auto deadline = std::chrono::steady_clock::now() + time;
-  while (std::chrono::steady_clock::now() < deadline) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(5ms);
-  }
-  return condition();
 }
 
 }  // namespace skullstation::testing

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <chrono>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -23,9 +21,5 @@ EngineOptions fake_engine_options(StepChain chain);
 /// Begins a case, writes `pictures` small files as its session, saves it.
 Result<Case> scan_fake_case(CaseStore& store, const std::string& number, const StepChain& chain,
                             int pictures = 3);
-
-/// Polls until it holds; false after the time.
-bool comes_true(const std::function<bool()>& condition,
-                std::chrono::seconds time = std::chrono::seconds(60));
 
 }  // namespace skullstation::testing

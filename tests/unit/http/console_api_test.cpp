@@ -7,6 +7,7 @@
 #include "core/file.h"
 #include "daemon/http/event_queue.h"
 #include "daemon/service/sealed_cases.h"
+#include "tests/support/station_client.h"
 #include "tests/support/steps.h"
 #include "tests/unit/http/small_console.h"
 

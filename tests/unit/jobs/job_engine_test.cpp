@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "tests/support/station_client.h"
 #include "tests/support/steps.h"
 #include "tests/support/temporary_folder.h"
 

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "core/file.h"
+#include "tests/support/station_client.h"
 #include "tests/support/steps.h"
 #include "tests/support/temporary_folder.h"
 

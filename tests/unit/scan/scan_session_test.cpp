@@ -214,8 +214,10 @@ TEST(RunScan, ACameraThatStaysAwayEndsTheScan) {
   const Result<ScanReport> report = bench.scan(folder / "s");
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().kind, ErrorKind::hardware);
-  EXPECT_THAT(report.error().message(),
-              HasSubstr("was unplugged; 3 of 12 views are recorded: the same scan started again"));
+  EXPECT_THAT(
+      report.error().message(),
+      HasSubstr("camera \"cam0\", fake camera: was unplugged; 3 of 12 views are recorded: the "
+                "same scan started again"));
   EXPECT_EQ(bench.camera0.reopened, 1);
   expect_at_rest(bench);
   EXPECT_EQ(expect_valid_session(folder / "s").views.size(), 3U);
