@@ -428,6 +428,8 @@ void add_commands(CLI::App& app, Command& chosen) {
             .add_flag("--mean-tissue", o.mean_tissue,
                       "the population's mean depths, as in the paper")
             ->excludes(tissue);
+        approximate.add_flag("--no-feature-rules", o.no_feature_rules,
+                             "nose and eyes as the model has them, whatever published rules say");
         approximate
             .add_option("--variants", o.variants,
                         "faces in the grid of two tissue variations: 1, 9 or 25")

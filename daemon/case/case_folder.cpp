@@ -37,6 +37,17 @@ std::string case_json(const FaceModel& model, const CaseSkull& skull, const Face
                          {"model_sd_mm", depth.model_sd_mm},
                          {"subjects", depth.subjects}});
   }
+  Json features = Json::array();
+  for (const FeatureFinding& feature : face.features) {
+    features.push_back({{"name", feature.name},
+                        {"source", feature.source},
+                        {"expected_mm", feature.expected_mm},
+                        {"sd_mm", json_of(feature.sd_mm)},
+                        {"in_face_mm", json_of(feature.in_face_mm)},
+                        {"used", feature.used}});
+  }
+  std::vector<std::string> warnings = skull.warnings;
+  warnings.insert(warnings.end(), face.warnings.begin(), face.warnings.end());
   Json variations = Json::array();
   for (const FaceVariation& variation : face.variations) {
     variations.push_back({{"name", variation.name},
@@ -70,8 +81,9 @@ std::string case_json(const FaceModel& model, const CaseSkull& skull, const Face
                {"observed_share", skull.quality.observed_share},
                {"mandible_observed_share", skull.quality.mandible_observed_share},
                {"strangeness_sd", skull.strangeness}}},
-             {"warnings", skull.warnings},
+             {"warnings", warnings},
              {"face", {{"mean_sd_mm", face.sd_mm.mean()}, {"mean_band80_mm", face.band_mm.mean()}}},
+             {"features", features},
              {"variations", variations},
              {"tissue", landmarks}}
              .dump(2) +

@@ -30,6 +30,19 @@ double mean_band_mm(const FaceEstimate& face) {
   return sum / std::max(1.0, count);
 }
 
+std::vector<std::pair<std::string, std::string>> feature_rows(const FaceEstimate& face) {
+  std::vector<std::pair<std::string, std::string>> rows;
+  for (const FeatureFinding& feature : face.features) {
+    std::string words = fmt::format("{:.1f} mm", feature.expected_mm);
+    if (feature.sd_mm) words += fmt::format(" +- {:.1f}", *feature.sd_mm);
+    words += fmt::format(" ({})", feature.source);
+    if (feature.in_face_mm) words += fmt::format("; this face {:.1f} mm", *feature.in_face_mm);
+    if (!feature.used) words += "; not used";
+    rows.emplace_back(feature.name, words);
+  }
+  return rows;
+}
+
 }  // namespace
 
 std::vector<LandmarkDepth> landmark_depths(const FaceModel& model, const FaceEstimate& face) {
@@ -118,6 +131,9 @@ Report case_report(const FaceModel& model, const CaseSkull& skull, const FaceEst
                     depth.sd_mm, depth.model_mean_mm, depth.model_sd_mm, depth.subjects));
   }
   report.add(Table{rows});
+
+  report.add(Heading{"Nose, eyes and mouth by published rules"});
+  report.add(Table{feature_rows(face)});
 
   report.add(Heading{"To make it again"});
   report.add(Table{{{"skull", source.input},

@@ -21,6 +21,7 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   options.facts.body_mass_index = command.body_mass_index;
   if (command.sex) options.facts.male = *command.sex == "male" ? 1.0 : 0.0;
   if (command.mean_tissue) options.tissue = TissueChoice::population;
+  options.feature_rules = !command.no_feature_rules;
   if (const auto sound = options.validate(); !sound) return forward(sound);
 
   CaseSource source;

@@ -186,10 +186,11 @@ struct ApproximateCommand {
   std::optional<std::string> sex;  ///< "male" or "female"
   std::optional<double> age_years;
   std::optional<double> body_mass_index;
-  std::string ancestry;          ///< written down; no model knows what to do with it
-  std::filesystem::path tissue;  ///< CSV of depths known at landmarks; empty: none
-  int variants = 9;              ///< 1, 9 or 25: the grid of two tissue variations
-  bool mean_tissue = false;      ///< the paper's way: the population's mean depths
+  std::string ancestry;           ///< written down; no model knows what to do with it
+  std::filesystem::path tissue;   ///< CSV of depths known at landmarks; empty: none
+  int variants = 9;               ///< 1, 9 or 25: the grid of two tissue variations
+  bool mean_tissue = false;       ///< the paper's way: the population's mean depths
+  bool no_feature_rules = false;  ///< nose and eyes as the model has them
   bool unit_unknown = false;
 };
 Result<CommandReport> run(const ApproximateCommand&, const CommonOptions&, const Progress&);

@@ -79,17 +79,18 @@ Result<ModelSubject> fit_subject(const fs::path& folder, const SkullTemplate& sk
   ModelSubject subject;
   subject.name = folder.filename().string();
   if (const auto read = read_facts(folder / "subject.json", subject); !read) return forward(read);
-  const auto bone = read_mesh(folder / "skull.ply");
-  if (!bone) return forward(bone);
-  const auto whole_skin = read_mesh(folder / "skin.ply");
-  if (!whole_skin) return forward(whole_skin);
-  // Where the scan ended is no skin: neither head nor depths may take it for one.
-  const TriangleMesh skin = opened_at_flat_cuts(*whole_skin);
+  const auto closed_bone = read_mesh(folder / "skull.ply");
+  if (!closed_bone) return forward(closed_bone);
+  const auto closed_skin = read_mesh(folder / "skin.ply");
+  if (!closed_skin) return forward(closed_skin);
+  // Where the scan ended are neither bone nor skin: no template may take the lids for them.
+  const TriangleMesh bone = opened_at_flat_cuts(*closed_bone);
+  const TriangleMesh skin = opened_at_flat_cuts(*closed_skin);
 
   SkullRegistrationOptions skull_options;
   skull_options.seed = options.seed;
   skull_options.threads = options.threads;
-  const auto skull_fit = register_skull(skull, *bone, skull_options, progress.part(0.0, 0.8));
+  const auto skull_fit = register_skull(skull, bone, skull_options, progress.part(0.0, 0.8));
   if (!skull_fit) return forward(skull_fit);
   if (skull_fit->quality.facial.mean_mm > worst_facial_mean_mm) {
     return fail(ErrorKind::no_result, folder.string(),

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruction/mesh/flat_cuts.h"
 #include "reconstruction/registration/similarity_fit.h"
 #include "reconstruction/statistics/population.h"
+#include "reconstruction/statistics/skull_completion.h"
 
 namespace skullstation {
 
@@ -27,7 +29,9 @@ constexpr double too_far_mm = 5.0;
 Result<CaseSkull> fit_case_skull(const FaceModel& model, const TriangleMesh& input,
                                  const SkullRegistrationOptions& options,
                                  const Progress& progress) {
-  const auto fit = register_skull(model.skull_template, input, options, progress);
+  // Where a scan ended is no bone.
+  const auto fit =
+      register_skull(model.skull_template, opened_at_flat_cuts(input), options, progress);
   if (!fit) return forward(fit);
   const SkullTemplate& skull = model.skull_template;
   CaseSkull result;
@@ -68,13 +72,10 @@ Result<CaseSkull> fit_case_skull(const FaceModel& model, const TriangleMesh& inp
     likely = shape_at(model.skull, result.belief.mean);
   }
   result.anatomical_from_input = anatomical_from_input;
-  result.vertices = completed_skull(skull, model.skull, result.vertices, fit->observed);
-  result.sd_mm = vertex_sd_mm(model.skull, result.belief).head(skull.boundary_count);
-  for (int v = 0; v < skull.boundary_count; ++v) {
-    result.sd_mm[v] = fit->observed[static_cast<std::size_t>(v)]
-                          ? observed_sd_mm
-                          : std::hypot(result.sd_mm[v], std::sqrt(model.skull.noise_variance));
-  }
+  const CompletedSkull completed =
+      completed_skull(skull, model.skull, result.vertices, fit->observed);
+  result.vertices = completed.vertices;
+  result.sd_mm = completed.sd_mm.array().max(observed_sd_mm);
   result.strangeness =
       result.belief.mean.norm() /
       std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, model.skull.mode_count())));

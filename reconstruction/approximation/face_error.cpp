@@ -41,6 +41,8 @@ FaceError face_error(const HeadTemplate& head_template, const Points3& head,
   const auto count = static_cast<double>(of_face.size());
   error.mean_mm /= count;
   error.within_band /= count;
+  error.features_mean_mm = (error.mean_mm * count - error.over_bone_mean_mm) /
+                           std::max(1.0, count - static_cast<double>(over_bone));
   error.over_bone_mean_mm /= std::max(1, over_bone);
   const auto p95 = of_face.begin() + static_cast<std::ptrdiff_t>(0.95 * (count - 1.0));
   std::ranges::nth_element(of_face, p95);

@@ -13,6 +13,7 @@ struct FaceError {
   double mean_mm = 0.0;
   double p95_mm = 0.0;
   double over_bone_mean_mm = 0.0;  ///< of the vertices outside nose, lips and eyes
+  double features_mean_mm = 0.0;   ///< of nose, lips and eyes
   double within_band = 0.0;        ///< share whose distance is at most the band's half width
 };
 

@@ -8,8 +8,10 @@
 #include <iterator>
 
 #include "core/parallel.h"
+#include "reconstruction/approximation/expected_features.h"
 #include "reconstruction/approximation/head_residual.h"
 #include "reconstruction/approximation/sphere_contacts.h"
+#include "reconstruction/registration/point_tree.h"
 #include "reconstruction/statistics/head_from_skull.h"
 
 namespace skullstation {
@@ -67,13 +69,8 @@ HeadAndTissue updated(const TissueModel& tissue, HeadAndTissue state,
     Eigen::VectorXd row = Eigen::VectorXd::Zero(state.both.mean.size());
     row.tail(tissue.mode_count()) = tissue.modes.row(v);
     const double log_sd = known.sd_mm / known.depth_mm;
-    const Eigen::VectorXd gain_of = state.both.covariance * row;
-    const double variance =
-        row.dot(gain_of) + log_sd * log_sd + tissue.noise_sd[v] * tissue.noise_sd[v];
-    const double surprise =
-        std::log(known.depth_mm) - tissue.log_mean[v] - row.dot(state.both.mean);
-    state.both.mean += gain_of * (surprise / variance);
-    state.both.covariance -= gain_of * gain_of.transpose() / variance;
+    state.both.observe(row, std::log(known.depth_mm) - tissue.log_mean[v],
+                       log_sd * log_sd + tissue.noise_sd[v] * tissue.noise_sd[v]);
   }
   return state;
 }
@@ -221,6 +218,16 @@ FaceVariation variation_along(const FaceModel& model, const HeadFit& fit, const 
   return variation;
 }
 
+/// Skin over bone that was not there is as uncertain as that bone, too.
+void add_missing_bone(const CaseSkull& skull, const TriangleMesh& bone, FaceEstimate& face) {
+  const PointTree nearest_bone(bone.vertices);
+  for (Index v = 0; v < face.sd_mm.size(); ++v) {
+    const auto below = nearest_bone.nearest(Eigen::Vector3d(face.head.row(v))).index;
+    if (skull.observed[static_cast<std::size_t>(below)]) continue;
+    face.sd_mm[v] = std::hypot(face.sd_mm[v], skull.sd_mm[below]);
+  }
+}
+
 double factor_of(const std::vector<BandFactor>& bands, std::string_view region) {
   const auto found = std::ranges::find(bands, region, &BandFactor::region);
   if (found != bands.end()) return found->factor;
@@ -278,6 +285,13 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
       break;
   }
 
+  // How much narrower the rules make the bands is not known from left-out subjects, so that it is
+  // not claimed.
+  const Belief foretold_head = prior;
+  const bool by_rules = options.feature_rules && options.tissue != TissueChoice::population;
+  const std::vector<ExpectedFeature> features = expected_features(model.skull_template, skull);
+  if (by_rules) prior = told_of_features(model, prior, features);
+
   progress.report(0.2, "sphere model");
   const TriangleMesh bone = surface_of(model.skull_template, skull.vertices.topRows(surface_count));
   SphereModelOptions sphere_options = options.spheres;
@@ -297,12 +311,21 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
   const Points3 normals = vertex_normals({face.head, model.head_template.triangles, {}, {}});
   // The bands were calibrated on what the joint model foretells from the skull; how much narrower
   // the spheres make them is not known from left-out subjects, so that it is not claimed.
-  face.sd_mm = sd_along_normals_mm(model.head, prior.covariance, normals);
+  face.sd_mm = sd_along_normals_mm(model.head, foretold_head.covariance, normals);
+  add_missing_bone(skull, bone, face);
   face.band_mm.resize(face.sd_mm.size());
   for (Index v = 0; v < face.sd_mm.size(); ++v) {
     const HeadRegion region = model.head_template.region[static_cast<std::size_t>(v)];
     face.band_mm[v] = factor_of(model.bands, to_string(region)) * face.sd_mm[v];
     face.from_bone.push_back(rests_on_bone(region));
+  }
+  for (const ExpectedFeature& feature : features) {
+    face.features.push_back({feature.name, feature.source, feature.expected_mm, feature.sd_mm,
+                             feature_mm(feature, model.head_template, face.head), by_rules});
+  }
+  if (const auto mouth = expected_mouth_width_mm(model.skull_template, skull)) {
+    face.features.push_back({"width of the mouth", "Stephan & Henneberg 2003", *mouth, std::nullopt,
+                             std::nullopt, false});
   }
   if (!model.joint.index_of("head 1")) {
     face.warnings.emplace_back(

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/progress.h"
@@ -32,6 +34,9 @@ struct FaceOptions {
   /// For `conditional`: what the model foretells is bent to agree with them, as far as they are
   /// certain.
   std::vector<KnownDepth> known_depths;
+  /// Nose and eyes are drawn to where published rules expect them, as far as these are certain; not
+  /// with the population's depths, the paper's method.
+  bool feature_rules = true;
   SphereModelOptions spheres;
   int rounds = 6;          ///< of correspondences between head and sphere model
   bool variations = true;  ///< find out how the face may vary, too
@@ -51,6 +56,16 @@ struct FaceVariation {
   double refit_gap_mm = 0.0;  ///< from the faces fitted anew there, mean over the vertices
 };
 
+/// What a published rule says of a feature that no bone carries, and what the face has.
+struct FeatureFinding {
+  std::string name;
+  std::string source;  ///< author and year
+  double expected_mm = 0.0;
+  std::optional<double> sd_mm;       ///< nothing: none is known
+  std::optional<double> in_face_mm;  ///< nothing: can't be told on the head
+  bool used = false;                 ///< the face was drawn to it
+};
+
 /// A face, how it may vary, and how far it may be off. Anatomical frame.
 struct FaceEstimate {
   Eigen::VectorXd tissue_mm;     ///< skull surface vertices, NaN where not modelled
@@ -61,6 +76,7 @@ struct FaceEstimate {
   Eigen::VectorXd band_mm;      ///< half width of the calibrated 80 % band
   std::vector<bool> from_bone;  ///< head vertices whose depth over bone carries them; the others
                                 ///< (nose, lips, eyes, ears) follow from the model alone
+  std::vector<FeatureFinding> features;
   std::vector<FaceVariation> variations;
   std::vector<std::string> warnings;
 };

@@ -10,7 +10,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
-#include "reconstruction/phantom/nose_rule.h"
+#include "reconstruction/anatomy/feature_rules.h"
 
 namespace skullstation {
 

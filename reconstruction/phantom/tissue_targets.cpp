@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "reconstruction/phantom/nose_rule.h"
+#include "reconstruction/anatomy/feature_rules.h"
 #include "reconstruction/phantom/thickness_table.h"
 
 namespace skullstation {

@@ -5,10 +5,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "reconstruction/registration/point_tree.h"
 #include "reconstruction/registration/similarity_fit.h"
+#include "reconstruction/statistics/skull_completion.h"
 
 namespace skullstation {
 
@@ -18,11 +17,10 @@ using Eigen::Index;
 
 constexpr int alignment_rounds = 4;
 constexpr std::size_t least_complete = 10;
+constexpr double complete_share = 0.98;
 constexpr double observation_sd_mm = 1.0;
 constexpr std::size_t observation_count = 2000;
 constexpr double independent_observations = 500.0;
-/// How far from the observed bone a completion still follows it.
-constexpr double transition_mm = 15.0;
 
 void transform(Points3& points, const Similarity3& target_from_source) {
   for (Index v = 0; v < points.rows(); ++v) {
@@ -51,16 +49,6 @@ Result<void> check(const SkullTemplate& skull, const HeadTemplate& head,
     return bad("a fitted vertex is not a number");
   }
   return {};
-}
-
-/// Outer vertices that were observed.
-std::vector<int> observed_outer(const SkullTemplate& skull, const std::vector<bool>& observed) {
-  std::vector<int> vertices;
-  for (int v = 0; v < skull.boundary_count; ++v) {
-    const auto i = static_cast<std::size_t>(v);
-    if (skull.outer[i] && observed[i]) vertices.push_back(v);
-  }
-  return vertices;
 }
 
 /// The depths of the subject's mirror image: NaN where a corner of the partner was not measured.
@@ -128,6 +116,15 @@ Result<std::vector<ModelSubject>> aligned_population(const SkullTemplate& skull,
   return subjects;
 }
 
+std::vector<int> observed_outer(const SkullTemplate& skull, const std::vector<bool>& observed) {
+  std::vector<int> vertices;
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    const auto i = static_cast<std::size_t>(v);
+    if (skull.outer[i] && observed[i]) vertices.push_back(v);
+  }
+  return vertices;
+}
+
 double observed_share(const SkullTemplate& skull, const std::vector<bool>& observed) {
   const Eigen::VectorXd weights = skull_weights(skull);
   double seen = 0.0;
@@ -150,48 +147,28 @@ Belief skull_belief(const SkullTemplate& skull, const ShapeModel& model, const P
   return updated(model, population_belief(model), observations);
 }
 
-Points3 completed_skull(const SkullTemplate& skull, const ShapeModel& model,
-                        const Points3& vertices, const std::vector<bool>& observed) {
-  const std::vector<int> seen = observed_outer(skull, observed);
-  Points3 likely = shape_at(model, skull_belief(skull, model, vertices, observed).mean);
-  if (seen.empty()) return likely;
-  const Points3 seen_template = skull.vertices(seen, Eigen::all);
-  const PointTree tree(seen_template);
-  Points3 result = vertices;
-  for (Index v = 0; v < result.rows(); ++v) {
-    if (v < skull.boundary_count && observed[static_cast<std::size_t>(v)]) continue;
-    Eigen::RowVector3d offset = Eigen::RowVector3d::Zero();
-    double weight_sum = 0.0;
-    double nearest_squared = std::numeric_limits<double>::infinity();
-    for (const NearPoint& near : tree.nearest(skull.vertices.row(v).transpose(), 12)) {
-      const double weight = 1.0 / (near.squared_distance + 1.0);
-      const int from = seen[static_cast<std::size_t>(near.index)];
-      offset += weight * (vertices.row(from) - likely.row(from));
-      weight_sum += weight;
-      nearest_squared = std::min(nearest_squared, near.squared_distance);
-    }
-    result.row(v) =
-        likely.row(v) + std::exp(-std::sqrt(nearest_squared) / transition_mm) * offset / weight_sum;
+void complete_skulls(const SkullTemplate& skull, std::vector<ModelSubject>& subjects) {
+  std::vector<double> shares;
+  for (const ModelSubject& subject : subjects) {
+    shares.push_back(observed_share(skull, subject.skull_observed));
   }
-  return result;
-}
-
-void complete_skulls(const SkullTemplate& skull, std::vector<ModelSubject>& subjects,
-                     double complete_share) {
+  if (shares.size() < least_complete) return;
+  const double complete = complete_share * std::ranges::max(shares);
   std::vector<Points3> whole;
   std::vector<ModelSubject*> partial;
-  for (ModelSubject& subject : subjects) {
-    if (observed_share(skull, subject.skull_observed) >= complete_share) {
-      whole.push_back(subject.skull);
+  for (std::size_t i = 0; i < subjects.size(); ++i) {
+    if (shares[i] >= complete) {
+      whole.push_back(subjects[i].skull);
     } else {
-      partial.push_back(&subject);
+      partial.push_back(&subjects[i]);
     }
   }
   if (whole.size() < least_complete || partial.empty()) return;
   const auto model = build_shape_model(whole, skull_weights(skull));
   if (!model) return;
   for (ModelSubject* subject : partial) {
-    subject->skull = completed_skull(skull, *model, subject->skull, subject->skull_observed);
+    subject->skull =
+        completed_skull(skull, *model, subject->skull, subject->skull_observed).vertices;
   }
 }
 

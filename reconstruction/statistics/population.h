@@ -36,6 +36,9 @@ Result<std::vector<ModelSubject>> aligned_population(const SkullTemplate& skull,
                                                      const HeadTemplate& head,
                                                      std::vector<ModelSubject> subjects);
 
+/// Outer surface vertices that were observed.
+std::vector<int> observed_outer(const SkullTemplate& skull, const std::vector<bool>& observed);
+
 /// Share of the template's outer surface that was observed.
 double observed_share(const SkullTemplate& skull, const std::vector<bool>& observed);
 
@@ -44,17 +47,10 @@ double observed_share(const SkullTemplate& skull, const std::vector<bool>& obser
 Belief skull_belief(const SkullTemplate& skull, const ShapeModel& model, const Points3& vertices,
                     const std::vector<bool>& observed);
 
-/// The skull with its unobserved vertices where they most likely are given the observed ones; they
-/// go over smoothly into those.
-Points3 completed_skull(const SkullTemplate& skull, const ShapeModel& model,
-                        const Points3& vertices, const std::vector<bool>& observed);
-
 /// Skulls of which a good part was not observed (a cropped calvaria) are completed by the model of
-/// the others, as in the paper's second pass. `complete_share` of the outer vertices must be
-/// observed for a subject to teach the others. Nothing changes where too few are complete
-/// (below 10).
-void complete_skulls(const SkullTemplate& skull, std::vector<ModelSubject>& subjects,
-                     double complete_share = 0.9);
+/// the others, as in the paper's second pass. Who shows nearly as much bone (98 %) as whoever shows
+/// most teaches the others. Nothing changes where these are fewer than 10.
+void complete_skulls(const SkullTemplate& skull, std::vector<ModelSubject>& subjects);
 
 /// Tissue of both halves of the face together: each subject teaches with its mirror image.
 Result<TissueModel> population_tissue_model(const SkullTemplate& skull,

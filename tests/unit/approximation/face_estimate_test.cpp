@@ -100,6 +100,26 @@ TEST(FaceEstimate, BandsHoldTheTruthAboutAsOftenAsTheySay) {
   EXPECT_GT(inside, 0.6 * all);
 }
 
+TEST(FaceEstimate, IsLessCertainWhereBoneWasMissing) {
+  const CaseSkull whole = case_of(everybody()[training]);
+  CaseSkull broken = whole;
+  for (int v = 0; v < skull_template().boundary_count; ++v) {
+    if (skull_template().vertices(v, 2) < 30.0) continue;
+    broken.observed[static_cast<std::size_t>(v)] = false;
+    broken.sd_mm[v] = 4.0;
+  }
+  const FaceEstimate face =
+      estimate_face(model(), whole, coarse(TissueChoice::conditional)).value();
+  const FaceEstimate less =
+      estimate_face(model(), broken, coarse(TissueChoice::conditional)).value();
+  for (Index v = 0; v < face.sd_mm.size(); ++v) {
+    const double height = head_template().vertices(v, 2);
+    if (height > 50.0) EXPECT_NEAR(less.sd_mm[v], std::hypot(face.sd_mm[v], 4.0), 1e-9);
+    if (height < 0.0) EXPECT_EQ(less.sd_mm[v], face.sd_mm[v]);
+    EXPECT_NEAR(less.band_mm[v] / less.sd_mm[v], face.band_mm[v] / face.sd_mm[v], 1e-9);
+  }
+}
+
 TEST(FaceEstimate, TissueGrowsWithTheBodyMassIndex) {
   const ModelSubject& subject = everybody()[training];
   const auto mean_depth = [&](double bmi) {
