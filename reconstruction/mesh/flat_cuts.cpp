@@ -17,6 +17,7 @@ constexpr double kLeastCosine = 0.98;
 TriangleMesh opened_at_flat_cuts(const TriangleMesh& mesh, double least_area_mm2) {
   std::vector<bool> lid(static_cast<std::size_t>(mesh.triangles.rows()), false);
   if (mesh.vertices.rows() == 0) return mesh;
+  double lids_mm2 = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::VectorXd height = side * mesh.vertices.col(axis);
@@ -35,9 +36,11 @@ TriangleMesh opened_at_flat_cuts(const TriangleMesh& mesh, double least_area_mm2
         area_mm2 += 0.5 * twice.norm();
       }
       if (area_mm2 < least_area_mm2) continue;
+      lids_mm2 += area_mm2;
       for (const Eigen::Index t : flat) lid[static_cast<std::size_t>(t)] = true;
     }
   }
+  if (lids_mm2 > 0.5 * surface_area(mesh)) return mesh;
   return submesh(mesh, [&](Eigen::Index t) { return !lid[static_cast<std::size_t>(t)]; });
 }
 

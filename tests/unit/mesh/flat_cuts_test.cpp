@@ -63,5 +63,16 @@ TEST(FlatCuts, ARoundBodyKeepsItsUtmostPoints) {
   EXPECT_EQ(opened_at_flat_cuts({}).triangles.rows(), 0);
 }
 
+TEST(FlatCuts, ABoxStays) {
+  TriangleMesh box;
+  box.vertices.resize(8, 3);
+  for (int v = 0; v < 8; ++v) box.vertices.row(v) << v % 2, v / 2 % 2, v / 4;
+  box.vertices *= 150.0;
+  box.triangles.resize(12, 3);
+  box.triangles << 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6,
+      0, 6, 2, 1, 3, 7, 1, 7, 5;
+  EXPECT_EQ(opened_at_flat_cuts(box).triangles, box.triangles);
+}
+
 }  // namespace
 }  // namespace skullstation
