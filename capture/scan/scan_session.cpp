@@ -30,8 +30,8 @@ class StationRest {
 
   Result<void> enter() {
     done_ = true;
-    const Result<void> released = hardware_.turntable->release();
-    const Result<void> dark = hardware_.lights->set(false);
+    Result<void> released = hardware_.turntable->release();
+    Result<void> dark = hardware_.lights->set(false);
     if (!released) return released;
     return dark;
   }
@@ -56,7 +56,7 @@ std::uint64_t bytes_bound(const FrameSize& size, PhotographFormat format) {
   const auto raw = static_cast<std::uint64_t>(size.width) *
                    static_cast<std::uint64_t>(size.height) *
                    static_cast<std::uint64_t>(size.channels);
-  constexpr std::uint64_t metadata = 64 * 1024;
+  constexpr std::uint64_t metadata = std::uint64_t{64} * 1024;
   return (format == PhotographFormat::png ? raw + raw / 100 : raw / 2) + metadata;
 }
 
@@ -113,7 +113,8 @@ Result<void> Scan::run(const fs::path& folder) {
   // The placement that still exists is used up first.
   std::vector<int> passes;
   for (int pass = 0; pass < options_.plan.passes; ++pass) passes.push_back(pass);
-  std::ranges::stable_partition(passes, [&](int pass) { return pass == recorder_.current_pass(); });
+  std::stable_partition(passes.begin(), passes.end(),
+                        [&](int pass) { return pass == recorder_.current_pass(); });
   for (const int pass : passes) {
     if (Result<void> done = take_pass(pass); !done) return done;
   }
@@ -166,7 +167,7 @@ Result<void> Scan::prepare_pass(int pass) {
   if (!begins_new_session) {
     // Hands are at the platter now: it must not be able to move.
     if (Result<void> released = station_.hardware.turntable->release(); !released) return released;
-    const Result<void> placed = station_.ask_for_placement({pass, continued}, progress_.stop);
+    Result<void> placed = station_.ask_for_placement({pass, continued}, progress_.stop);
     if (!placed) return placed;
     // The door had to be opened. The emergency stop, in contrast, ends the scan.
     Interlock& interlock = *station_.hardware.interlock;
@@ -175,7 +176,7 @@ Result<void> Scan::prepare_pass(int pass) {
     }
   }
   if (Result<void> safe = check_interlock(); !safe) return safe;
-  const Result<void> homed = station_.hardware.turntable->home(progress_.stop);
+  Result<void> homed = station_.hardware.turntable->home(progress_.stop);
   if (Result<void> safe = check_interlock(); !safe) return safe;
   return homed;
 }
@@ -199,8 +200,7 @@ Result<void> Scan::take_pass(int pass) {
   for (const ScanStop& stop : stops) {
     const std::vector<PlannedView> missing = missing_views(stop);
     if (missing.empty()) continue;
-    const Result<void> moved =
-        station_.hardware.turntable->move_to(stop.table_angle_deg, progress_.stop);
+    Result<void> moved = station_.hardware.turntable->move_to(stop.table_angle_deg, progress_.stop);
     if (Result<void> safe = check_interlock(); !safe) return safe;
     if (!moved) return moved;
     const Instant settled = station_.clock.now() + options_.settle_time;

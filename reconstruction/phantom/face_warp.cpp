@@ -1,5 +1,7 @@
 #include "reconstruction/phantom/face_warp.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
@@ -228,7 +230,8 @@ void FaceWarpModel::Fit::add_pairs() {
       const Rigid3 turn = bone_.landmarks[on_bone].on_mandible ? bone_.open_from_closed : Rigid3{};
       const Vector3d bone = turn.inverse() * bone_.canonical_mm[on_bone];
       Pair pair;
-      pair.landmark = landmark_index(model_.skin_landmarks_, name + " skin" + suffix);
+      pair.landmark =
+          landmark_index(model_.skin_landmarks_, fmt::format("{} skin{}", name, suffix));
       pair.skin = skin_landmark(pair.landmark);
       // Bone landmarks that are extremes lie elsewhere on each skull, and the skin's go with them.
       const Vector3d shift = bone - model_.bone_landmarks_[on_bone].position_mm;

@@ -1,5 +1,7 @@
 #include "reconstruction/phantom/tissue_targets.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cassert>
 #include <string>
@@ -36,7 +38,8 @@ std::vector<WarpTarget> tissue_targets(std::span<const Landmark> bone,
     for (const char* side : {" left", " right"}) {
       const std::string suffix = row.bilateral ? side : "";
       const std::string name(row.bone);
-      keep(length_measure(name, on_bone(name + suffix), on_skin(name + " skin" + suffix)),
+      keep(length_measure(name, on_bone(name + suffix),
+                          on_skin(fmt::format("{} skin{}", name, suffix))),
            0.3 + 0.04 * row.mean_mm);
       if (!row.bilateral) break;
     }

@@ -149,6 +149,7 @@ Belief skull_belief(const SkullTemplate& skull, const ShapeModel& model, const P
 
 void complete_skulls(const SkullTemplate& skull, std::vector<ModelSubject>& subjects) {
   std::vector<double> shares;
+  shares.reserve(subjects.size());
   for (const ModelSubject& subject : subjects) {
     shares.push_back(observed_share(skull, subject.skull_observed));
   }

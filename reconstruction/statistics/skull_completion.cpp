@@ -33,7 +33,7 @@ constexpr double doubtful_mm = 8.0;
 
 /// The observed outer vertices that are believed.
 std::vector<int> believed(const SkullTemplate& skull, const std::vector<bool>& observed) {
-  std::vector<int> seen = observed_outer(skull, observed);
+  const std::vector<int> seen = observed_outer(skull, observed);
   std::vector<int> missing;
   for (int v = 0; v < skull.boundary_count; ++v) {
     const auto at = static_cast<std::size_t>(v);
@@ -41,14 +41,13 @@ std::vector<int> believed(const SkullTemplate& skull, const std::vector<bool>& o
   }
   if (missing.empty()) return seen;
   const PointTree breaks(skull.vertices(missing, Eigen::all));
-  const auto doubtful = [&](int v) {
+  std::vector<int> sound = seen;
+  std::erase_if(sound, [&](int v) {
     return breaks.nearest(skull.vertices.row(v).transpose()).squared_distance <
            doubtful_mm * doubtful_mm;
-  };
-  const auto sound = std::ranges::remove_if(seen, doubtful);
+  });
   // A skull of nothing but breaks has to be believed.
-  if (sound.begin() != seen.begin()) seen.erase(sound.begin(), sound.end());
-  return seen;
+  return sound.empty() ? seen : sound;
 }
 
 /// Covariance of the rest between points of the template, #a x #b.
