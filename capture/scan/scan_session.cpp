@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "capture/scan/image_metadata.h"
@@ -111,8 +112,8 @@ Result<void> Scan::run(const fs::path& folder) {
   if (Result<void> begun = recorder_.begin(); !begun) return begun;
 
   // The placement that still exists is used up first.
-  std::vector<int> passes;
-  for (int pass = 0; pass < options_.plan.passes; ++pass) passes.push_back(pass);
+  std::vector<int> passes(static_cast<std::size_t>(options_.plan.passes));
+  std::iota(passes.begin(), passes.end(), 0);
   std::stable_partition(passes.begin(), passes.end(),
                         [&](int pass) { return pass == recorder_.current_pass(); });
   for (const int pass : passes) {

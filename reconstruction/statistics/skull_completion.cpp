@@ -33,7 +33,7 @@ constexpr double doubtful_mm = 8.0;
 
 /// The observed outer vertices that are believed.
 std::vector<int> believed(const SkullTemplate& skull, const std::vector<bool>& observed) {
-  const std::vector<int> seen = observed_outer(skull, observed);
+  std::vector<int> seen = observed_outer(skull, observed);
   std::vector<int> missing;
   for (int v = 0; v < skull.boundary_count; ++v) {
     const auto at = static_cast<std::size_t>(v);
