@@ -2,12 +2,14 @@
 // never saw, as Markdown tables (docs/faces.md). Usage:
 //   bench_remains [--model FILE] [--people 10] [--seed 5000]
 // A vertex of the head counts as observed if the bone nearest to it was; face, nose, lips, eyes and
-// scalp count, ears and neck do not.
+// scalp count, ears and neck do not. Then the bone itself: the vertices that were missing, beside
+// where the template's fit to the whole skull has them.
 
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <vector>
 
@@ -30,12 +32,14 @@ struct Options {
   std::uint64_t seed = 5000;
 };
 
-/// A face and, for each vertex of its head, how far it is off and whether bone below was observed.
+/// A face and, for each vertex of its head, how far it is off and whether bone below was observed;
+/// and the bone that it was made over.
 struct JudgedFace {
   Eigen::VectorXd error_mm;
   Eigen::VectorXd sd_mm;
   Eigen::VectorXd band_mm;
   std::vector<bool> observed;
+  CaseSkull skull;
 };
 
 Result<JudgedFace> judged_face(const FaceModel& model, const Person& person, Remains remains) {
@@ -48,7 +52,7 @@ Result<JudgedFace> judged_face(const FaceModel& model, const Person& person, Rem
   const TriangleMesh skin = moved(skull->anatomical_from_input, person.skin);
   const TriangleBvh truth(skin);
   const PointTree bone(skull->vertices.topRows(model.skull_template.boundary_count));
-  JudgedFace judged{Eigen::VectorXd(face->head.rows()), face->sd_mm, face->band_mm, {}};
+  JudgedFace judged{Eigen::VectorXd(face->head.rows()), face->sd_mm, face->band_mm, {}, *skull};
   for (Eigen::Index v = 0; v < face->head.rows(); ++v) {
     const Eigen::Vector3d at = face->head.row(v);
     judged.error_mm[v] = truth.closest(at).distance_mm;
@@ -83,6 +87,36 @@ struct PartMeans {
   }
 };
 
+/// Over the coordinates of the outer bone that was missing, of all people.
+struct BoneMeans {
+  double count = 0.0;
+  double squares_mm2 = 0.0;
+  double variance_mm2 = 0.0;
+  double in_band = 0.0;
+
+  void add(const SkullTemplate& skull, const CaseSkull& remains, const CaseSkull& whole) {
+    constexpr double gaussian_80 = 1.2816;
+    const Similarity3 to_whole =
+        whole.anatomical_from_input * remains.anatomical_from_input.inverse();
+    for (int v = 0; v < skull.boundary_count; ++v) {
+      const auto at = static_cast<std::size_t>(v);
+      if (!skull.outer[at] || remains.observed[at] || !whole.observed[at]) continue;
+      const Eigen::Vector3d off =
+          to_whole * Eigen::Vector3d(remains.vertices.row(v)) - whole.vertices.row(v).transpose();
+      const double sd_mm = remains.sd_mm[v];
+      count += 3.0;
+      squares_mm2 += off.squaredNorm();
+      variance_mm2 += 3.0 * sd_mm * sd_mm;
+      in_band += static_cast<double>((off.array().abs() <= gaussian_80 * sd_mm).count());
+    }
+  }
+  void print(Remains remains) const {
+    fmt::print("| {} | {:.2f} | {:.2f} | {:.0f} % |\n", to_string(remains),
+               std::sqrt(squares_mm2 / count), std::sqrt(variance_mm2 / count),
+               100.0 * in_band / count);
+  }
+};
+
 Result<void> run(const Options& options) {
   const auto source =
       load_model(options.model.empty() ? std::optional<std::filesystem::path>() : options.model);
@@ -90,6 +124,7 @@ Result<void> run(const Options& options) {
   const FaceModel& model = source->model;
   constexpr std::array kinds = {Remains::no_mandible, Remains::no_calvaria, Remains::half_face};
   std::array<std::array<PartMeans, 2>, kinds.size()> parts;  // missing, observed
+  std::array<BoneMeans, kinds.size()> bones;
   const PersonMaker maker(edge_mm, 0);
   int failed = 0;
   for (int i = 0; i < options.people; ++i) {
@@ -104,6 +139,7 @@ Result<void> run(const Options& options) {
         ++failed;
         continue;
       }
+      bones[k].add(model.skull_template, face->skull, whole->skull);
       for (Eigen::Index v = 0; v < face->error_mm.size(); ++v) {
         const auto at = static_cast<std::size_t>(v);
         const HeadRegion region = model.head_template.region[at];
@@ -124,6 +160,10 @@ Result<void> run(const Options& options) {
     parts[k][1].print(kinds[k], "bone observed", all);
     parts[k][0].print(kinds[k], "bone missing", all);
   }
+  fmt::print(
+      "\n| missing bone | error of a coordinate, RMS mm | SD mm | in a Gaussian's 80 % band "
+      "|\n|---|---|---|---|\n");
+  for (std::size_t k = 0; k < kinds.size(); ++k) bones[k].print(kinds[k]);
   return {};
 }
 

@@ -26,9 +26,10 @@ struct CaseSkull {
   std::vector<std::string> warnings;
 };
 
-/// Fits the model's template to the input skull, brings it into the anatomical frame and completes
-/// it from the skull model. Fails as register_skull does, and with `bad_input` for what is too
-/// strange to be a skull of the model's kind.
+/// Fits the model's template to the input skull, without the flat lids that a scan's ends make,
+/// brings it into the anatomical frame and completes it from the skull model. Fails as
+/// register_skull does, and with `bad_input` for what is too strange to be a skull of the model's
+/// kind.
 Result<CaseSkull> fit_case_skull(const FaceModel& model, const TriangleMesh& input,
                                  const SkullRegistrationOptions& options = {},
                                  const Progress& progress = {});

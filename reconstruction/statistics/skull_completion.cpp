@@ -17,9 +17,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// What the modes leave over in people whom the model has not seen, over which length it stays
-/// alike, and what a fit adds at each vertex. By leaving out each of 39 whole skulls of the default
-/// model's people and looking at their mandibles, calvariae and halves of the face
-/// (docs/models.md).
+/// alike, and what a fit adds at each vertex. Chosen by hiding parts of 39 fitted whole skulls of
+/// the default model's people, each foretold by the others (docs/models.md).
 constexpr double rest_sd_mm = 2.0;
 constexpr double rest_length_mm = 40.0;
 constexpr double fit_sd_mm = 0.5;

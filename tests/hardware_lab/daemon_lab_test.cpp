@@ -238,7 +238,8 @@ TEST_F(DaemonLab, TheEmergencyStopLatches) {
   const long steps = table_.steps_made();
 
   table_.press_button();  // the stop is still in
-  std::this_thread::sleep_for(3s);
+  ASSERT_TRUE(
+      comes_true([] { return said("message").find("can't be reset") != std::string::npos; }));
   ASSERT_TRUE(becomes("fault"));
   table_.release_stop();
   std::this_thread::sleep_for(3s);

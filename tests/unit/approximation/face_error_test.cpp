@@ -25,6 +25,7 @@ TEST(FaceError, CountsTheFaceAndNotEarsScalpAndNeck) {
   EXPECT_EQ(error.vertices, 3);
   EXPECT_DOUBLE_EQ(error.mean_mm, 3.0);
   EXPECT_DOUBLE_EQ(error.over_bone_mean_mm, 1.0);
+  EXPECT_DOUBLE_EQ(error.features_mean_mm, 4.0);
   EXPECT_DOUBLE_EQ(error.within_band, 2.0 / 3.0);
 }
 
