@@ -5,6 +5,7 @@
 
 #include "core/parallel.h"
 #include "reconstruction/distance/triangle_bvh.h"
+#include "reconstruction/registration/point_tree.h"
 #include "reconstruction/rendering/outside.h"
 
 namespace skullstation {
@@ -12,11 +13,37 @@ namespace skullstation {
 namespace {
 constexpr double kObserved_mm = 2.0;
 constexpr double kObservedAngle_deg = 60.0;
+/// On the undeformed template: farther apart are different places.
+constexpr double kSamePlace_mm = 12.0;
 /// Of the input's vertices; more tell no more.
 constexpr int kMeasured = 60000;
 /// Rays over the whole sphere to learn whether a vertex of the input lies on its outside.
 constexpr int kDirections = 100;
 constexpr int kChunk = 512;
+/// Of an outer vertex, within about 8 mm.
+constexpr int kNeighbours = 24;
+
+/// The observed vertices but for those most of whose neighbours were not: a missing bone's that
+/// came to lie on another by chance.
+std::vector<bool> without_islands(const SkullTemplate& skull, const std::vector<char>& observed) {
+  std::vector<int> outer;
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    if (skull.outer[static_cast<std::size_t>(v)]) outer.push_back(v);
+  }
+  std::vector<bool> result(observed.begin(), observed.end());
+  const PointTree tree(skull.vertices(outer, Eigen::all));
+  for (const int v : outer) {
+    const auto at = static_cast<std::size_t>(v);
+    if (observed[at] == 0) continue;
+    const auto around = tree.nearest(skull.vertices.row(v).transpose(), kNeighbours);
+    const auto seen = std::ranges::count_if(around, [&](const NearPoint& near) {
+      return observed[static_cast<std::size_t>(outer[static_cast<std::size_t>(near.index)])] != 0;
+    });
+    result[at] = 2 * seen >= static_cast<std::ptrdiff_t>(around.size());
+  }
+  return result;
+}
+
 }  // namespace
 
 FitDistances distances_of(std::vector<double> distances_mm) {
@@ -42,6 +69,15 @@ FitDistances distances_of(std::vector<double> distances_mm) {
 void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
                        const InputSurface& input, int threads, FittedSkull& fitted) {
   const TriangleMesh surface = surface_of(skull, vertices);
+  const TriangleBvh bvh(surface);
+  // A place of the input is one place of the template: what lies on it by chance, a bone that is
+  // missing say, isn't observed.
+  const auto shows = [&](const InputHit& hit, int v) {
+    const Eigen::Vector3i corners = skull.boundary.row(bvh.closest(hit.point).triangle);
+    const auto bone_at = [&](int w) { return bone_of(skull.region[static_cast<std::size_t>(w)]); };
+    return bone_at(corners[0]) == bone_at(v) &&
+           (skull.vertices.row(corners[0]) - skull.vertices.row(v)).norm() <= kSamePlace_mm;
+  };
   const auto count = static_cast<std::size_t>(skull.boundary_count);
   std::vector<char> observed(count, 0);
   fitted.distance_mm.assign(count, 0.0);
@@ -51,14 +87,13 @@ void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
       const InputHit any =
           input.nearest_point(surface.vertices.row(v), surface.normals.row(v), 1e3, 180.0);
       fitted.distance_mm[at] = any.valid ? any.distance_mm : 1e3;
-      observed[at] = skull.outer[at] && any.valid && any.distance_mm <= kObserved_mm &&
-                     input
-                         .nearest_point(surface.vertices.row(v), surface.normals.row(v),
-                                        kObserved_mm, kObservedAngle_deg)
-                         .valid;
+      if (!skull.outer[at] || fitted.distance_mm[at] > kObserved_mm) continue;
+      const InputHit hit = input.nearest_point(surface.vertices.row(v), surface.normals.row(v),
+                                               kObserved_mm, kObservedAngle_deg);
+      observed[at] = hit.valid && shows(hit, v);
     }
   });
-  fitted.observed.assign(observed.begin(), observed.end());
+  fitted.observed = without_islands(skull, observed);
   const Eigen::VectorXd area = vertex_areas(surface_of(skull, skull.vertices));
   double outer = 0.0;
   double seen = 0.0;
@@ -78,7 +113,6 @@ void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
   quality.observed_share = outer > 0.0 ? seen / outer : 0.0;
   quality.mandible_observed_share = mandible > 0.0 ? mandible_seen / mandible : 0.0;
 
-  const TriangleBvh bvh(surface);
   const auto points = static_cast<int>(input.mesh().vertices.rows());
   const int stride = std::max(1, points / kMeasured);
   const int measured = (points + stride - 1) / stride;

@@ -64,6 +64,8 @@ constexpr double kHold = 1e-4;
 constexpr double kTangentialShare = 0.02;
 /// No tetrahedron may keep less of its rest volume.
 constexpr double kLeastVolumeShare = 0.05;
+/// Share of the mandible that has to be observed for there to be one.
+constexpr double kLeastMandible = 0.2;
 /// Of the paper's volume term, relative to a level's smoothness: chosen for the best fit on
 /// phantoms, see docs/registration.md.
 constexpr double kVolumePerSmooth = 1e-9;
@@ -93,7 +95,7 @@ class Fit {
 
   /// Hierarchical ICP, then the whole template after its parts. The cranium is bent by itself
   /// before the mandible is looked for, and begins anew with it.
-  PartAlignment follow_parts() {
+  void follow_parts() {
     const TriangleMesh surface = state_.surface;
     const Points3 unplaced = state_.vertices;
     begin_stage();
@@ -110,7 +112,6 @@ class Fit {
     const SkullPairs pairs = part_pairs(state_, parts, input_, kPartLimits, options_.threads);
     const double move = deform(rest_, pairs, kPartsSmooth_mm4, 1.0, true);
     end_stage("parts", 1, pairs, move);
-    return parts;
   }
 
   void run(const Level& level) {
@@ -324,7 +325,7 @@ Result<FittedSkull> register_skull(const SkullTemplate& skull, const TriangleMes
       InputSurface::make(moved(frame.inverse(), input), kSampleSpacing_mm, options.threads);
   if (!surface) return forward(surface);
   Fit fit(skull, pose.scale / frame.scale, *surface, options);
-  const PartAlignment parts = fit.follow_parts();
+  fit.follow_parts();
   bool released = false;
   for (std::size_t l = 0; l < std::size(kLevels); ++l) {
     if (progress.stop.stop_requested()) return cancelled();
@@ -350,8 +351,12 @@ Result<FittedSkull> register_skull(const SkullTemplate& skull, const TriangleMes
       fit_similarity(skull.vertices.topRows(skull.boundary_count),
                      fitted.vertices.topRows(skull.boundary_count), {}, FitScale::to_target);
   fitted.input_from_template = similarity.value_or(pose);
-  if (!parts.mandible_found || fitted.quality.mandible_observed_share < 0.2) {
+  if (fitted.quality.mandible_observed_share < kLeastMandible) {
     fitted.warnings.push_back("no mandible in the input: it lies where the cranium puts it");
+    for (int v = 0; v < skull.boundary_count; ++v) {
+      const auto at = static_cast<std::size_t>(v);
+      if (bone_of(skull.region[at]) == SkullBone::mandible) fitted.observed[at] = false;
+    }
   }
   if (fitted.quality.observed_share < 0.6) {
     fitted.warnings.push_back(fmt::format("the input shows {:.0f} % of the skull's outside only",

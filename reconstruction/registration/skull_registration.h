@@ -47,8 +47,8 @@ struct FittedSkull {
   Points3 vertices;  ///< #V x 3 in the template's order, in the input's frame [mm]
   /// Best similarity between template and fit.
   Similarity3 input_from_template;
-  /// Surface vertices (#boundary_count) that the input shows: outer, and the input's surface is
-  /// within 2 mm with a normal that agrees.
+  /// Surface vertices (#boundary_count) that the input shows: outer, the input's surface is within
+  /// 2 mm with a normal that agrees, and nearest to it lies the same place of the template.
   std::vector<bool> observed;
   std::vector<double> distance_mm;  ///< #boundary_count: to the input's surface
   SkullFitQuality quality;

@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "core/random.h"
+#include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/phantom/person.h"
 #include "reconstruction/registration/head_registration.h"
 #include "reconstruction/templates/make_templates.h"
@@ -120,6 +121,41 @@ TEST(SkullRegistration, SaysThatThereIsNoMandible) {
   EXPECT_LT(fit->quality.mandible_observed_share, 0.2);
   EXPECT_THAT(fit->warnings, testing::Contains(testing::HasSubstr("no mandible")));
   EXPECT_EQ(fit->quality.inverted_tetrahedra, 0);
+  for (int v = 0; v < skull_template().boundary_count; ++v) {
+    const auto at = static_cast<std::size_t>(v);
+    if (bone_of(skull_template().region[at]) == SkullBone::mandible) {
+      EXPECT_FALSE(fit->observed[at]);
+    }
+  }
+}
+
+TEST(SkullRegistration, WhatIsMissingIsNotObserved) {
+  const TriangleMesh& whole = person().skull;
+  const TriangleMesh right = submesh(whole, [&](Eigen::Index t) {
+    return whole.vertices(whole.triangles.row(t), 0).maxCoeff() < 0.0;
+  });
+  const Similarity3 identity;
+  const auto fit = register_skull(skull_template(), right, {.start = &identity, .threads = 2});
+  ASSERT_TRUE(fit) << fit.error().message();
+  int right_seen = 0;
+  int right_all = 0;
+  int left_seen = 0;
+  int left_all = 0;
+  for (int v = 0; v < skull_template().boundary_count; ++v) {
+    const auto at = static_cast<std::size_t>(v);
+    if (!skull_template().outer[at]) continue;
+    const double x = skull_template().vertices(v, 0);
+    if (x < -15.0) {
+      ++right_all;
+      right_seen += fit->observed[at] ? 1 : 0;
+    }
+    if (x > 15.0) {
+      ++left_all;
+      left_seen += fit->observed[at] ? 1 : 0;
+    }
+  }
+  EXPECT_GT(right_seen, 0.8 * right_all);
+  EXPECT_LT(left_seen, 0.05 * left_all);
 }
 
 TEST(SkullRegistration, FollowsAnOpenMandible) {
