@@ -75,6 +75,9 @@ Result<CaseSkull> fit_case_skull(const FaceModel& model, const TriangleMesh& inp
   const CompletedSkull completed =
       completed_skull(skull, model.skull, result.vertices, fit->observed);
   result.vertices = completed.vertices;
+  const std::vector<bool> everything(result.observed.size(), true);
+  result.belief = skull_belief(skull, model.skull, result.vertices, everything);
+  result.belief.covariance += completed.coefficient_covariance;
   result.sd_mm = completed.sd_mm.array().max(observed_sd_mm);
   result.strangeness =
       result.belief.mean.norm() /

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "reconstruction/registration/point_tree.h"
 #include "reconstruction/statistics/population.h"
@@ -16,155 +17,232 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What the modes leave over in people whom the model has not seen, over which length it stays
-/// alike, and what a fit adds at each vertex. Chosen by hiding parts of 39 fitted whole skulls of
-/// the default model's people, each foretold by the others (docs/models.md).
+// The first four were chosen by hiding parts of whole skulls of the default model's people, each
+// foretold by the others (docs/models.md).
+
+/// Correlations of the model fall to `far_correlation` of what they are over some such length.
+constexpr double local_length_mm = 80.0;
+constexpr double far_correlation = 0.3;
+/// What the modes leave over in people whom the model has not seen, and over which length it stays
+/// alike.
 constexpr double rest_sd_mm = 2.0;
 constexpr double rest_length_mm = 40.0;
-constexpr double fit_sd_mm = 0.5;
-/// Observed vertices that the completion starts from, spread over the bone.
-constexpr std::size_t node_count = 600;
+/// How far a fitted vertex may lie from its place, across the surface and along it. Near a break
+/// nothing holds a fit along the surface, and it may take one thing for another: what lies closer
+/// than `doubtful_mm` is not believed at all.
+constexpr double across_sd_mm = 0.5;
+constexpr double along_sd_mm = 1.0;
+constexpr double along_break_sd_mm = 12.0;
+constexpr double break_reach_mm = 15.0;
+constexpr double doubtful_mm = 8.0;
+/// Observed vertices that the completion starts from, spread over the bone, and missing ones whose
+/// uncertainty is computed.
+constexpr std::size_t node_count = 300;
+constexpr std::size_t probe_count = 500;
 /// How far from the observed bone a completion still follows what is finer than its nodes.
 constexpr double transition_mm = 15.0;
 
-/// Near a break a fit takes one thing for another: what lies closer to it is not believed.
-constexpr double doubtful_mm = 8.0;
+/// About `count` of them, evenly.
+std::vector<int> thinned(const std::vector<int>& vertices, std::size_t count) {
+  std::vector<int> some;
+  const std::size_t step = std::max<std::size_t>(1, vertices.size() / count);
+  for (std::size_t i = 0; i < vertices.size(); i += step) some.push_back(vertices[i]);
+  return some;
+}
+
+/// Distance of these vertices from where bone is missing, on the template; infinite where nothing
+/// is. A foramen that a fit does not find is no break: most of the bone around it is there.
+VectorXd distance_to_break_mm(const SkullTemplate& skull, const std::vector<bool>& observed,
+                              const std::vector<int>& vertices) {
+  constexpr int neighbours = 24;
+  std::vector<int> outer;
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    if (skull.outer[static_cast<std::size_t>(v)]) outer.push_back(v);
+  }
+  const auto missing = [&](int v) { return !observed[static_cast<std::size_t>(v)]; };
+  const PointTree near_outer(skull.vertices(outer, Eigen::all));
+  std::vector<int> broken;
+  for (const int v : outer) {
+    if (!missing(v)) continue;
+    const auto around = near_outer.nearest(skull.vertices.row(v).transpose(), neighbours);
+    const auto gone = std::ranges::count_if(around, [&](const NearPoint& near) {
+      return missing(outer[static_cast<std::size_t>(near.index)]);
+    });
+    if (2 * gone >= static_cast<std::ptrdiff_t>(around.size())) broken.push_back(v);
+  }
+  VectorXd distance_mm = VectorXd::Constant(static_cast<Index>(vertices.size()),
+                                            std::numeric_limits<double>::infinity());
+  if (broken.empty()) return distance_mm;
+  const PointTree breaks(skull.vertices(broken, Eigen::all));
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    distance_mm[static_cast<Index>(i)] = std::sqrt(
+        breaks.nearest(skull.vertices.row(vertices[i]).transpose()).squared_distance);
+  }
+  return distance_mm;
+}
 
 /// The observed outer vertices that are believed.
 std::vector<int> believed(const SkullTemplate& skull, const std::vector<bool>& observed) {
-  std::vector<int> seen = observed_outer(skull, observed);
-  std::vector<int> missing;
-  for (int v = 0; v < skull.boundary_count; ++v) {
-    const auto at = static_cast<std::size_t>(v);
-    if (skull.outer[at] && !observed[at]) missing.push_back(v);
+  const std::vector<int> seen = observed_outer(skull, observed);
+  const VectorXd distance_mm = distance_to_break_mm(skull, observed, seen);
+  std::vector<int> sound;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (distance_mm[static_cast<Index>(i)] >= doubtful_mm) sound.push_back(seen[i]);
   }
-  if (missing.empty()) return seen;
-  const PointTree breaks(skull.vertices(missing, Eigen::all));
-  std::vector<int> sound = seen;
-  std::erase_if(sound, [&](int v) {
-    return breaks.nearest(skull.vertices.row(v).transpose()).squared_distance <
-           doubtful_mm * doubtful_mm;
-  });
   // A skull of nothing but breaks has to be believed.
   return sound.empty() ? seen : sound;
 }
 
-/// Covariance of the rest between points of the template, #a x #b.
-MatrixXd rest_covariance(const Points3& a, const Points3& b) {
-  MatrixXd covariance(a.rows(), b.rows());
-  for (Index j = 0; j < b.rows(); ++j) {
-    covariance.col(j) = (a.rowwise() - b.row(j)).rowwise().squaredNorm();
-  }
-  return (rest_sd_mm * rest_sd_mm) *
-         (covariance.array() / (-2.0 * rest_length_mm * rest_length_mm)).exp();
-}
-
-/// Rows of the modes that belong to one axis of these vertices, #vertices x #modes.
-MatrixXd modes_along(const MatrixXd& modes, const std::vector<int>& vertices, int axis) {
-  MatrixXd rows(static_cast<Index>(vertices.size()), modes.cols());
-  for (Index i = 0; i < rows.rows(); ++i) {
-    rows.row(i) = modes.row(3 * Index{vertices[static_cast<std::size_t>(i)]} + axis);
-  }
-  return rows;
-}
-
-class Kriging {
+/// Skulls as a Gaussian process over the template's vertices. Coordinates of vertices come as
+/// x0 y0 z0 x1 ...
+class SkullProcess {
  public:
-  Kriging(const SkullTemplate& skull, const ShapeModel& model, const Points3& vertices,
-          const std::vector<int>& seen)
-      : skull_(skull), modes_(model.scaled_modes()), mean_(unflattened(model.mean)) {
-    const std::size_t step = std::max<std::size_t>(1, seen.size() / node_count);
-    for (std::size_t i = 0; i < seen.size(); i += step) nodes_.push_back(seen[i]);
-    places_ = skull.vertices(nodes_, Eigen::all);
-    MatrixXd covariance = rest_covariance(places_, places_);
-    covariance.diagonal().array() += fit_sd_mm * fit_sd_mm;
-    covariance_.compute(covariance);
+  SkullProcess(const SkullTemplate& skull, const ShapeModel& model)
+      : skull_(skull), modes_(model.scaled_modes()) {}
 
-    const Points3 offsets = vertices(nodes_, Eigen::all) - mean_(nodes_, Eigen::all);
-    MatrixXd information = MatrixXd::Identity(modes_.cols(), modes_.cols());
-    VectorXd right = VectorXd::Zero(modes_.cols());
-    for (int axis = 0; axis < 3; ++axis) {
-      const MatrixXd trend = modes_along(modes_, nodes_, axis);
-      const MatrixXd solved = covariance_.solve(trend);
-      information += trend.transpose() * solved;
-      right += solved.transpose() * offsets.col(axis);
-    }
-    information_.compute(information);
-    coefficients_ = information_.solve(right);
-    Points3 rest(offsets.rows(), 3);
-    for (int axis = 0; axis < 3; ++axis) {
-      rest.col(axis) = offsets.col(axis) - modes_along(modes_, nodes_, axis) * coefficients_;
-    }
-    weights_ = covariance_.solve(MatrixXd(rest));
-  }
-
-  /// #wanted x 3
-  Points3 likely(const std::vector<int>& wanted) const {
-    const Points3 at = skull_.vertices(wanted, Eigen::all);
-    Points3 result = mean_(wanted, Eigen::all);
-    result += rest_covariance(at, places_) * weights_;
-    for (int axis = 0; axis < 3; ++axis) {
-      result.col(axis) += modes_along(modes_, wanted, axis) * coefficients_;
+  /// 3 #a x 3 #b [mm^2]
+  MatrixXd covariance(const std::vector<int>& a, const std::vector<int>& b) const {
+    MatrixXd result = modes_of(a) * modes_of(b).transpose();
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      for (std::size_t j = 0; j < b.size(); ++j) {
+        const double squared = (skull_.vertices.row(a[i]) - skull_.vertices.row(b[j])).squaredNorm();
+        const double near = std::exp(squared / (-2.0 * local_length_mm * local_length_mm));
+        auto block = result.block<3, 3>(3 * static_cast<Index>(i), 3 * static_cast<Index>(j));
+        block *= far_correlation + (1.0 - far_correlation) * near;
+        block.diagonal().array() +=
+            rest_sd_mm * rest_sd_mm *
+            std::exp(squared / (-2.0 * rest_length_mm * rest_length_mm));
+      }
     }
     return result;
   }
 
-  VectorXd sd_mm(const std::vector<int>& wanted) const {
-    const MatrixXd between = rest_covariance(skull_.vertices(wanted, Eigen::all), places_);
-    const MatrixXd weights = covariance_.solve(between.transpose()).transpose();
-    const VectorXd known = weights.cwiseProduct(between).rowwise().sum();
-    VectorXd variance = (rest_sd_mm * rest_sd_mm - known.array()).max(0.0);
-    for (int axis = 0; axis < 3; ++axis) {
-      const MatrixXd untold =
-          modes_along(modes_, wanted, axis) - weights * modes_along(modes_, nodes_, axis);
-      variance +=
-          information_.matrixL().solve(untold.transpose()).colwise().squaredNorm().transpose() /
-          3.0;
+  /// 3 #vertices x #modes [mm]
+  MatrixXd modes_of(const std::vector<int>& vertices) const {
+    MatrixXd rows(3 * static_cast<Index>(vertices.size()), modes_.cols());
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      rows.middleRows<3>(3 * static_cast<Index>(i)) = modes_.middleRows<3>(3 * Index{vertices[i]});
     }
-    return variance.cwiseSqrt();
+    return rows;
   }
 
  private:
   const SkullTemplate& skull_;
   const MatrixXd modes_;
-  const Points3 mean_;
-  std::vector<int> nodes_;
-  Points3 places_;
-  Eigen::LLT<MatrixXd> covariance_;   // of the nodes' rest
-  Eigen::LLT<MatrixXd> information_;  // about the modes
-  VectorXd coefficients_;
-  MatrixXd weights_;  // #nodes x 3
 };
+
+/// How fitted vertices err, a block for each.
+std::vector<Eigen::Matrix3d> fit_errors(const SkullTemplate& skull, const Points3& vertices,
+                                        const std::vector<bool>& observed,
+                                        const std::vector<int>& nodes) {
+  const Points3 normals = surface_of(skull, vertices).normals;
+  const VectorXd to_break_mm = distance_to_break_mm(skull, observed, nodes);
+  std::vector<Eigen::Matrix3d> errors;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const Eigen::Vector3d normal = normals.row(nodes[i]);
+    const Eigen::Matrix3d across = normal * normal.transpose();
+    const double along_mm =
+        along_sd_mm +
+        along_break_sd_mm * std::exp(-to_break_mm[static_cast<Index>(i)] / break_reach_mm);
+    errors.emplace_back(across_sd_mm * across_sd_mm * across +
+                        along_mm * along_mm * (Eigen::Matrix3d::Identity() - across));
+  }
+  return errors;
+}
+
+/// The process where some vertices are known.
+class KnownSkull {
+ public:
+  KnownSkull(const SkullProcess& process, const Points3& mean, const Points3& vertices,
+             std::vector<int> nodes, const std::vector<Eigen::Matrix3d>& errors)
+      : process_(process), mean_(mean), nodes_(std::move(nodes)) {
+    MatrixXd covariance = process.covariance(nodes_, nodes_);
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const auto at = 3 * static_cast<Index>(i);
+      covariance.block<3, 3>(at, at) += errors[i];
+    }
+    factor_.compute(covariance);
+    weights_ = factor_.solve(
+        flattened(vertices(nodes_, Eigen::all) - mean(nodes_, Eigen::all)));
+  }
+
+  /// #wanted x 3
+  Points3 likely(const std::vector<int>& wanted) const {
+    // In blocks, since there may be tens of thousands.
+    constexpr std::size_t block = 500;
+    Points3 result(static_cast<Index>(wanted.size()), 3);
+    for (std::size_t begin = 0; begin < wanted.size(); begin += block) {
+      const std::vector<int> some(
+          wanted.begin() + static_cast<std::ptrdiff_t>(begin),
+          wanted.begin() + static_cast<std::ptrdiff_t>(std::min(begin + block, wanted.size())));
+      result.middleRows(static_cast<Index>(begin), static_cast<Index>(some.size())) =
+          mean_(some, Eigen::all) +
+          unflattened(process_.covariance(some, nodes_) * weights_);
+    }
+    return result;
+  }
+
+  /// What remains unknown of the wanted vertices' coordinates, 3 #wanted x 3 #wanted [mm^2].
+  MatrixXd covariance(const std::vector<int>& wanted) const {
+    const MatrixXd told = factor_.matrixL().solve(process_.covariance(nodes_, wanted));
+    return process_.covariance(wanted, wanted) - told.transpose() * told;
+  }
+
+ private:
+  const SkullProcess& process_;
+  const Points3& mean_;
+  std::vector<int> nodes_;
+  Eigen::LLT<MatrixXd> factor_;
+  VectorXd weights_;
+};
+
+/// Root mean variance of each probe's coordinates.
+VectorXd sd_of(const MatrixXd& covariance) {
+  VectorXd sd(covariance.rows() / 3);
+  for (Index i = 0; i < sd.size(); ++i) {
+    sd[i] = std::sqrt(std::max(0.0, covariance.diagonal().segment<3>(3 * i).mean()));
+  }
+  return sd;
+}
 
 }  // namespace
 
 CompletedSkull completed_skull(const SkullTemplate& skull, const ShapeModel& model,
                                const Points3& vertices, const std::vector<bool>& observed) {
   const std::vector<int> seen = believed(skull, observed);
-  CompletedSkull completed{vertices, VectorXd::Zero(skull.boundary_count)};
+  const Index modes = model.mode_count();
+  CompletedSkull completed{vertices, VectorXd::Zero(skull.boundary_count),
+                           MatrixXd::Zero(modes, modes)};
+  const Points3 mean = unflattened(model.mean);
   if (seen.empty()) {
-    completed.vertices = unflattened(model.mean);
+    completed.vertices = mean;
     completed.sd_mm =
         (vertex_sd_mm(model, population_belief(model)).head(skull.boundary_count).array().square() +
          rest_sd_mm * rest_sd_mm)
             .sqrt();
+    completed.coefficient_covariance.setIdentity();
     return completed;
   }
-  std::vector<int> missing;
+  std::vector<int> missing;  // those on the surface first
   for (Index v = 0; v < vertices.rows(); ++v) {
     if (v < skull.boundary_count && observed[static_cast<std::size_t>(v)]) continue;
     missing.push_back(static_cast<int>(v));
   }
-  const Kriging kriging(skull, model, vertices, seen);
-  const Points3 likely = kriging.likely(missing);
-  const Points3 finer = vertices(seen, Eigen::all) - kriging.likely(seen);
-  const PointTree tree(skull.vertices(seen, Eigen::all));
+  if (missing.empty()) return completed;
+
+  const SkullProcess process(skull, model);
+  const std::vector<int> nodes = thinned(seen, node_count);
+  const KnownSkull known(process, mean, vertices, nodes,
+                         fit_errors(skull, vertices, observed, nodes));
+  const Points3 likely = known.likely(missing);
+  const Points3 finer = vertices(seen, Eigen::all) - known.likely(seen);
+  const PointTree near_seen(skull.vertices(seen, Eigen::all));
   for (std::size_t i = 0; i < missing.size(); ++i) {
     const int v = missing[i];
     Eigen::RowVector3d offset = Eigen::RowVector3d::Zero();
     double weight_sum = 0.0;
     double nearest_squared = std::numeric_limits<double>::infinity();
-    for (const NearPoint& near : tree.nearest(skull.vertices.row(v).transpose(), 12)) {
+    for (const NearPoint& near : near_seen.nearest(skull.vertices.row(v).transpose(), 12)) {
       const double weight = 1.0 / (near.squared_distance + 1.0);
       offset += weight * finer.row(near.index);
       weight_sum += weight;
@@ -174,11 +252,22 @@ CompletedSkull completed_skull(const SkullTemplate& skull, const ShapeModel& mod
         likely.row(static_cast<Index>(i)) +
         std::exp(-std::sqrt(nearest_squared) / transition_mm) * offset / weight_sum;
   }
-  std::erase_if(missing, [&](int v) { return v >= skull.boundary_count; });
-  const VectorXd sd_mm = kriging.sd_mm(missing);
-  for (std::size_t i = 0; i < missing.size(); ++i) {
-    completed.sd_mm[missing[i]] = sd_mm[static_cast<Index>(i)];
+
+  const std::vector<int> probes = thinned(missing, probe_count);
+  const MatrixXd unknown = known.covariance(probes);
+  const VectorXd sd_mm = sd_of(unknown);
+  const PointTree near_probes(skull.vertices(probes, Eigen::all));
+  for (const int v : missing) {
+    if (v >= skull.boundary_count) break;
+    completed.sd_mm[v] =
+        sd_mm[near_probes.nearest(skull.vertices.row(v).transpose()).index];
   }
+  // Each probe stands for the missing vertices around it.
+  const double each = static_cast<double>(missing.size()) / static_cast<double>(probes.size());
+  const MatrixXd coefficients_of_probes =
+      each * (process.modes_of(probes) * model.variances.cwiseInverse().asDiagonal());
+  completed.coefficient_covariance =
+      coefficients_of_probes.transpose() * unknown * coefficients_of_probes;
   return completed;
 }
 
