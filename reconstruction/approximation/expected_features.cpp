@@ -1,8 +1,10 @@
 #include "reconstruction/approximation/expected_features.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "reconstruction/anatomy/feature_rules.h"
@@ -131,6 +133,51 @@ std::optional<SurfacePoint> point_of(const ExpectedFeature& feature,
   return foremost(feature, head_template, head);
 }
 
+/// Over which length soft parts move alike.
+constexpr double soft_length_mm = 12.0;
+
+double alike(const Vector3d& a, const Vector3d& b) {
+  return std::exp((a - b).squaredNorm() / (-2.0 * soft_length_mm * soft_length_mm));
+}
+
+/// How far each vertex goes along with the skin at `place`, which goes by 1; those over bone stay.
+Eigen::VectorXd going_along(const HeadTemplate& head_template, const Points3& head,
+                            const Vector3d& place) {
+  constexpr double reach_mm = 3.0 * soft_length_mm;
+  constexpr std::size_t most_anchors = 200;
+  std::vector<int> soft;
+  std::vector<int> fixed;
+  for (Index v = 0; v < head.rows(); ++v) {
+    if ((head.row(v).transpose() - place).norm() > reach_mm) continue;
+    const HeadRegion region = head_template.region[static_cast<std::size_t>(v)];
+    (rests_on_bone(region) ? fixed : soft).push_back(static_cast<int>(v));
+  }
+  std::vector<Vector3d> anchors;
+  for (std::size_t i = 0; i < fixed.size(); i += fixed.size() / most_anchors + 1) {
+    anchors.emplace_back(head.row(fixed[i]));
+  }
+  const auto count = static_cast<Index>(anchors.size());
+  const auto with_anchors = [&](const Vector3d& at) {
+    Eigen::VectorXd covariance(count);
+    for (Index i = 0; i < count; ++i) {
+      covariance[i] = alike(at, anchors[static_cast<std::size_t>(i)]);
+    }
+    return covariance;
+  };
+  Eigen::MatrixXd inner(count, count);
+  for (Index i = 0; i < count; ++i) inner.col(i) = with_anchors(anchors[static_cast<std::size_t>(i)]);
+  inner.diagonal().array() += 0.01;
+  const Eigen::VectorXd from_place = with_anchors(place);
+  const Eigen::VectorXd weights = Eigen::LLT<Eigen::MatrixXd>(inner).solve(from_place);
+  const double variance = 1.0 - weights.dot(from_place);
+  Eigen::VectorXd along = Eigen::VectorXd::Zero(head.rows());
+  for (const int v : soft) {
+    const Vector3d at = head.row(v);
+    along[v] = (alike(at, place) - weights.dot(with_anchors(at))) / variance;
+  }
+  return along;
+}
+
 }  // namespace
 
 std::vector<ExpectedFeature> expected_features(const SkullTemplate& skull_template,
@@ -156,31 +203,20 @@ std::optional<double> expected_mouth_width_mm(const SkullTemplate& skull_templat
   return (bones.at("supra-canine left") - bones.at("supra-canine right")).norm() / kCaninesToMouth;
 }
 
-Belief told_of_features(const FaceModel& model, const Belief& head,
-                        const std::vector<ExpectedFeature>& features) {
-  // Which point is meant depends on the head.
-  constexpr int rounds = 3;
-  const Eigen::MatrixXd modes = model.head.scaled_modes();
-  Belief told = head;
-  for (int round = 0; round < rounds; ++round) {
-    const Points3 shape = shape_at(model.head, told.mean);
-    told = head;
-    for (const ExpectedFeature& feature : features) {
-      const auto point = point_of(feature, model.head_template, shape);
-      if (!point) continue;
-      Eigen::VectorXd row = Eigen::VectorXd::Zero(told.mean.size());
-      double mean_mm = -feature.way.dot(feature.origin);
-      for (int k = 0; k < 3; ++k) {
-        const Index at = 3 * Index{point->corners[k]};
-        row += point->weights[k] * modes.middleRows<3>(at).transpose() * feature.way;
-        mean_mm += point->weights[k] * feature.way.dot(model.head.mean.segment<3>(at));
-      }
-      const double variance =
-          feature.sd_mm * feature.sd_mm + point->weights.squaredNorm() * model.head.noise_variance;
-      told.observe(row, feature.expected_mm - mean_mm, variance);
-    }
+Points3 drawn_to_features(const HeadTemplate& head_template, Points3 head,
+                          const Eigen::VectorXd& sd_mm,
+                          const std::vector<ExpectedFeature>& features) {
+  for (const ExpectedFeature& feature : features) {
+    const auto point = point_of(feature, head_template, head);
+    if (!point) continue;
+    const Vector3d place = point->position(head);
+    double sd = 0.0;
+    for (int k = 0; k < 3; ++k) sd += point->weights[k] * sd_mm[point->corners[k]];
+    const double missing_mm = feature.expected_mm - feature.way.dot(place - feature.origin);
+    const double gain = sd * sd / (sd * sd + feature.sd_mm * feature.sd_mm);
+    head += gain * missing_mm * going_along(head_template, head, place) * feature.way.transpose();
   }
-  return told;
+  return head;
 }
 
 }  // namespace skullstation

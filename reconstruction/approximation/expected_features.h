@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "reconstruction/approximation/case_skull.h"
-#include "reconstruction/statistics/belief.h"
-#include "reconstruction/statistics/face_model.h"
+#include "reconstruction/registration/head_template.h"
 
 namespace skullstation {
 
@@ -41,8 +40,12 @@ std::optional<double> feature_mm(const ExpectedFeature& feature, const HeadTempl
 std::optional<double> expected_mouth_width_mm(const SkullTemplate& skull_template,
                                               const CaseSkull& skull);
 
-/// What is believed of the head's coefficients once the features are expected there.
-Belief told_of_features(const FaceModel& model, const Belief& head,
-                        const std::vector<ExpectedFeature>& features);
+/// The head (template's vertices x 3) with its features drawn to where they are expected: as far as
+/// the rules are more certain than the face is (`sd_mm`, of its vertices along their normals). What
+/// no bone carries goes along with a feature the less the farther away it lies, as in a Gaussian
+/// process that is known to be 0 where skin rests on bone.
+Points3 drawn_to_features(const HeadTemplate& head_template, Points3 head,
+                          const Eigen::VectorXd& sd_mm,
+                          const std::vector<ExpectedFeature>& features);
 
 }  // namespace skullstation

@@ -30,8 +30,22 @@ constexpr double residual_sd_mm = 2.0;
 /// Of depths that were measured on the person.
 constexpr double own_depth_sd_mm = 0.3;
 
-bool rests_on_bone(HeadRegion region) {
-  return region == HeadRegion::face || region == HeadRegion::scalp;
+/// Half width of the band that holds 80 % of a Gaussian, in standard deviations.
+constexpr double gaussian_80 = 1.2816;
+
+/// Half widths of the head's 80 % bands, calibrated where the model has calibrations. How much
+/// narrower spheres and rules make them is not known from left-out subjects, so that it is not
+/// claimed.
+Eigen::VectorXd band_mm(const FaceModel& model, const Eigen::MatrixXd& covariance,
+                        const Points3& head) {
+  const Points3 normals = vertex_normals({head, model.head_template.triangles, {}, {}});
+  Eigen::VectorXd band_mm = sd_along_normals_mm(model.head, covariance, normals);
+  for (Index v = 0; v < band_mm.size(); ++v) {
+    const HeadRegion region = model.head_template.region[static_cast<std::size_t>(v)];
+    const auto band = std::ranges::find(model.bands, to_string(region), &BandFactor::region);
+    band_mm[v] *= band == model.bands.end() ? gaussian_80 : band->factor;
+  }
+  return band_mm;
 }
 
 /// Head and tissue together: what is known of the head's coefficients, then the tissue's.
@@ -169,11 +183,14 @@ JointStep joint_step(const FaceModel& model, const Belief& belief, const std::st
   return step;
 }
 
-/// The head over a bone: as the spheres of these depths and what is foretold of its modes have it.
+/// The head over a bone: as the spheres of these depths and what is foretold of its modes have it,
+/// its nose and lids drawn to where rules expect them.
 class HeadFit {
  public:
-  HeadFit(const FaceModel& model, const TriangleMesh& bone, const FaceOptions& options)
-      : model_(model), bone_(bone), options_(options) {}
+  /// \param features none: without rules
+  HeadFit(const FaceModel& model, const TriangleMesh& bone, const FaceOptions& options,
+          std::vector<ExpectedFeature> features)
+      : model_(model), bone_(bone), options_(options), features_(std::move(features)) {}
 
   /// \param tissue_mm the bone's vertices, NaN where not modelled
   Points3 operator()(const Belief& prior, const Eigen::VectorXd& tissue_mm) const {
@@ -182,14 +199,18 @@ class HeadFit {
     const SphereContacts contacts(bone_, radius_mm);
     const Belief drawn = drawn_to_spheres(model_, prior, contacts, bone_, radius_mm,
                                           options_.rounds, options_.threads);
-    return bent_to_spheres(model_, shape_at(model_.head, drawn.mean), contacts, radius_mm,
-                           options_.rounds, options_.threads);
+    const Points3 head = bent_to_spheres(model_, shape_at(model_.head, drawn.mean), contacts,
+                                         radius_mm, options_.rounds, options_.threads);
+    if (features_.empty()) return head;
+    const Eigen::VectorXd sd_mm = band_mm(model_, prior.covariance, head) / gaussian_80;
+    return drawn_to_features(model_.head_template, head, sd_mm, features_);
   }
 
  private:
   const FaceModel& model_;
   const TriangleMesh& bone_;
   const FaceOptions& options_;
+  const std::vector<ExpectedFeature> features_;
 };
 
 /// The variation of a face along a variable: half way between the faces fitted anew at either end.
@@ -225,14 +246,8 @@ void add_missing_bone(const CaseSkull& skull, const TriangleMesh& bone, FaceEsti
     const auto below = nearest_bone.nearest(Eigen::Vector3d(face.head.row(v))).index;
     if (skull.observed[static_cast<std::size_t>(below)]) continue;
     face.sd_mm[v] = std::hypot(face.sd_mm[v], skull.sd_mm[below]);
+    face.band_mm[v] = std::hypot(face.band_mm[v], gaussian_80 * skull.sd_mm[below]);
   }
-}
-
-double factor_of(const std::vector<BandFactor>& bands, std::string_view region) {
-  const auto found = std::ranges::find(bands, region, &BandFactor::region);
-  if (found != bands.end()) return found->factor;
-  // Without a calibration a Gaussian's own 80 %.
-  return 1.2816;
 }
 
 }  // namespace
@@ -285,13 +300,6 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
       break;
   }
 
-  // How much narrower the rules make the bands is not known from left-out subjects, so that it is
-  // not claimed.
-  const Belief foretold_head = prior;
-  const bool by_rules = options.feature_rules && options.tissue != TissueChoice::population;
-  const std::vector<ExpectedFeature> features = expected_features(model.skull_template, skull);
-  if (by_rules) prior = told_of_features(model, prior, features);
-
   progress.report(0.2, "sphere model");
   const TriangleMesh bone = surface_of(model.skull_template, skull.vertices.topRows(surface_count));
   SphereModelOptions sphere_options = options.spheres;
@@ -306,17 +314,15 @@ Result<FaceEstimate> estimate_face(const FaceModel& model, const CaseSkull& skul
   }
 
   progress.report(0.4, "head");
-  const HeadFit fit(model, bone, options);
+  const bool by_rules = options.feature_rules && options.tissue != TissueChoice::population;
+  const std::vector<ExpectedFeature> features = expected_features(model.skull_template, skull);
+  const HeadFit fit(model, bone, options, by_rules ? features : std::vector<ExpectedFeature>());
   face.head = fit(prior, face.tissue_mm);
   const Points3 normals = vertex_normals({face.head, model.head_template.triangles, {}, {}});
-  // The bands were calibrated on what the joint model foretells from the skull; how much narrower
-  // the spheres make them is not known from left-out subjects, so that it is not claimed.
-  face.sd_mm = sd_along_normals_mm(model.head, foretold_head.covariance, normals);
+  face.sd_mm = sd_along_normals_mm(model.head, prior.covariance, normals);
+  face.band_mm = band_mm(model, prior.covariance, face.head);
   add_missing_bone(skull, bone, face);
-  face.band_mm.resize(face.sd_mm.size());
-  for (Index v = 0; v < face.sd_mm.size(); ++v) {
-    const HeadRegion region = model.head_template.region[static_cast<std::size_t>(v)];
-    face.band_mm[v] = factor_of(model.bands, to_string(region)) * face.sd_mm[v];
+  for (const HeadRegion region : model.head_template.region) {
     face.from_bone.push_back(rests_on_bone(region));
   }
   for (const ExpectedFeature& feature : features) {

@@ -17,6 +17,10 @@ bool is_facial(HeadRegion region) {
          region == HeadRegion::eyes;
 }
 
+bool rests_on_bone(HeadRegion region) {
+  return region == HeadRegion::face || region == HeadRegion::scalp;
+}
+
 Result<void> HeadTemplate::validate() const {
   const auto bad = [](std::string what) {
     return fail(ErrorKind::bad_input, "head template", std::move(what), "make it again");

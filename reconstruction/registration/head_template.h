@@ -28,6 +28,9 @@ std::string_view to_string(HeadRegion region);
 /// and neck.
 bool is_facial(HeadRegion region);
 
+/// Skin that lies over bone, at a depth that can be known: face and scalp.
+bool rests_on_bone(HeadRegion region);
+
 /// A head's skin that can be deformed onto others, in the anatomical frame of the skull template
 /// [mm]; bald, lids and mouth closed, open at the neck. Gietzen et al. 2019: about 6,000 vertices.
 struct HeadTemplate {

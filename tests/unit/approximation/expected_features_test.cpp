@@ -110,22 +110,41 @@ TEST(ExpectedFeatures, TheMouthIsWiderThanTheCaninesAreApart) {
   EXPECT_NEAR(*expected_mouth_width_mm(bones.skull, bones.fitted), 38.0 / 0.758, 1e-9);
 }
 
-TEST(ExpectedFeatures, DrawTheHeadAsFarAsTheyAreCertain) {
-  // One mode moves the nose forward by 4 mm a standard deviation; its tip lies 30 mm before the
-  // nasion, and 29.7 are expected.
-  FaceModel model;
-  model.head_template = small_head();
-  Eigen::MatrixXd modes = Eigen::MatrixXd::Zero(18, 1);
-  modes(1, 0) = modes(4, 0) = -4.0;
-  model.head = shape_model_of(flattened(model.head_template.vertices), modes, 0.25);
+/// The rule for how far forward the tip of the nose lies: 29.7 mm, where small_head() has 30.
+std::vector<ExpectedFeature> forward_only() {
   const Landmarks bones = nose_bones();
   const auto features = expected_features(bones.skull, bones.fitted);
-  const Belief told =
-      told_of_features(model, Belief::standard_normal(1), {features.begin(), features.begin() + 1});
-  const double sign = model.head.modes(4, 0) < 0.0 ? 1.0 : -1.0;
-  const double variance = kNoseRule_sd_mm * kNoseRule_sd_mm + 0.25;
-  EXPECT_NEAR(sign * told.mean[0], 4.0 * (29.7 - 30.0) / (16.0 + variance), 1e-9);
-  EXPECT_NEAR(told.covariance(0, 0), 1.0 - 16.0 / (16.0 + variance), 1e-9);
+  return {features.begin(), features.begin() + 1};
+}
+
+TEST(ExpectedFeatures, DrawTheHeadAsFarAsTheyAreCertain) {
+  const HeadTemplate head = small_head();
+  constexpr double sd_mm = 4.0;
+  const Points3 drawn = drawn_to_features(head, head.vertices, Eigen::VectorXd::Constant(6, sd_mm),
+                                          forward_only());
+  const double gain = sd_mm * sd_mm / (sd_mm * sd_mm + kNoseRule_sd_mm * kNoseRule_sd_mm);
+  EXPECT_NEAR(drawn(1, 1), -110.0 + 0.3 * gain, 1e-9) << "the tip";
+  EXPECT_EQ(drawn(1, 0), 0.0);
+  EXPECT_EQ(drawn(1, 2), 5.0);
+  const double along = (drawn(0, 1) + 100.0) / (drawn(1, 1) + 110.0);
+  EXPECT_GT(along, 0.4) << "11 mm away, half of it";
+  EXPECT_LT(along, 0.9);
+  EXPECT_TRUE(drawn.bottomRows(4).isApprox(head.vertices.bottomRows(4))) << "the lids are far away";
+}
+
+TEST(ExpectedFeatures, LeaveAHeadThatIsCertain) {
+  const HeadTemplate head = small_head();
+  EXPECT_EQ(drawn_to_features(head, head.vertices, Eigen::VectorXd::Zero(6), forward_only()),
+            head.vertices);
+}
+
+TEST(ExpectedFeatures, DoNotMoveSkinOverBone) {
+  HeadTemplate head = small_head();
+  head.region[0] = HeadRegion::face;
+  const Points3 drawn =
+      drawn_to_features(head, head.vertices, Eigen::VectorXd::Constant(6, 4.0), forward_only());
+  EXPECT_EQ(drawn.row(0), head.vertices.row(0));
+  EXPECT_GT(drawn(1, 1), -110.0);
 }
 
 }  // namespace
