@@ -165,7 +165,8 @@ Eigen::VectorXd going_along(const HeadTemplate& head_template, const Points3& he
     return covariance;
   };
   Eigen::MatrixXd inner(count, count);
-  for (Index i = 0; i < count; ++i) inner.col(i) = with_anchors(anchors[static_cast<std::size_t>(i)]);
+  for (Index i = 0; i < count; ++i)
+    inner.col(i) = with_anchors(anchors[static_cast<std::size_t>(i)]);
   inner.diagonal().array() += 0.01;
   const Eigen::VectorXd from_place = with_anchors(place);
   const Eigen::VectorXd weights = Eigen::LLT<Eigen::MatrixXd>(inner).solve(from_place);

@@ -75,8 +75,8 @@ VectorXd distance_to_break_mm(const SkullTemplate& skull, const std::vector<bool
   if (broken.empty()) return distance_mm;
   const PointTree breaks(skull.vertices(broken, Eigen::all));
   for (std::size_t i = 0; i < vertices.size(); ++i) {
-    distance_mm[static_cast<Index>(i)] = std::sqrt(
-        breaks.nearest(skull.vertices.row(vertices[i]).transpose()).squared_distance);
+    distance_mm[static_cast<Index>(i)] =
+        std::sqrt(breaks.nearest(skull.vertices.row(vertices[i]).transpose()).squared_distance);
   }
   return distance_mm;
 }
@@ -105,13 +105,13 @@ class SkullProcess {
     MatrixXd result = modes_of(a) * modes_of(b).transpose();
     for (std::size_t i = 0; i < a.size(); ++i) {
       for (std::size_t j = 0; j < b.size(); ++j) {
-        const double squared = (skull_.vertices.row(a[i]) - skull_.vertices.row(b[j])).squaredNorm();
+        const double squared =
+            (skull_.vertices.row(a[i]) - skull_.vertices.row(b[j])).squaredNorm();
         const double near = std::exp(squared / (-2.0 * local_length_mm * local_length_mm));
         auto block = result.block<3, 3>(3 * static_cast<Index>(i), 3 * static_cast<Index>(j));
         block *= far_correlation + (1.0 - far_correlation) * near;
         block.diagonal().array() +=
-            rest_sd_mm * rest_sd_mm *
-            std::exp(squared / (-2.0 * rest_length_mm * rest_length_mm));
+            rest_sd_mm * rest_sd_mm * std::exp(squared / (-2.0 * rest_length_mm * rest_length_mm));
       }
     }
     return result;
@@ -162,8 +162,7 @@ class KnownSkull {
       covariance.block<3, 3>(at, at) += errors[i];
     }
     factor_.compute(covariance);
-    weights_ = factor_.solve(
-        flattened(vertices(nodes_, Eigen::all) - mean(nodes_, Eigen::all)));
+    weights_ = factor_.solve(flattened(vertices(nodes_, Eigen::all) - mean(nodes_, Eigen::all)));
   }
 
   /// #wanted x 3
@@ -176,8 +175,7 @@ class KnownSkull {
           wanted.begin() + static_cast<std::ptrdiff_t>(begin),
           wanted.begin() + static_cast<std::ptrdiff_t>(std::min(begin + block, wanted.size())));
       result.middleRows(static_cast<Index>(begin), static_cast<Index>(some.size())) =
-          mean_(some, Eigen::all) +
-          unflattened(process_.covariance(some, nodes_) * weights_);
+          mean_(some, Eigen::all) + unflattened(process_.covariance(some, nodes_) * weights_);
     }
     return result;
   }
@@ -259,8 +257,7 @@ CompletedSkull completed_skull(const SkullTemplate& skull, const ShapeModel& mod
   const PointTree near_probes(skull.vertices(probes, Eigen::all));
   for (const int v : missing) {
     if (v >= skull.boundary_count) break;
-    completed.sd_mm[v] =
-        sd_mm[near_probes.nearest(skull.vertices.row(v).transpose()).index];
+    completed.sd_mm[v] = sd_mm[near_probes.nearest(skull.vertices.row(v).transpose()).index];
   }
   // Each probe stands for the missing vertices around it.
   const double each = static_cast<double>(missing.size()) / static_cast<double>(probes.size());

@@ -120,8 +120,8 @@ std::vector<ExpectedFeature> forward_only() {
 TEST(ExpectedFeatures, DrawTheHeadAsFarAsTheyAreCertain) {
   const HeadTemplate head = small_head();
   constexpr double sd_mm = 4.0;
-  const Points3 drawn = drawn_to_features(head, head.vertices, Eigen::VectorXd::Constant(6, sd_mm),
-                                          forward_only());
+  const Points3 drawn =
+      drawn_to_features(head, head.vertices, Eigen::VectorXd::Constant(6, sd_mm), forward_only());
   const double gain = sd_mm * sd_mm / (sd_mm * sd_mm + kNoseRule_sd_mm * kNoseRule_sd_mm);
   EXPECT_NEAR(drawn(1, 1), -110.0 + 0.3 * gain, 1e-9) << "the tip";
   EXPECT_EQ(drawn(1, 0), 0.0);
