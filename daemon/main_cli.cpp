@@ -436,6 +436,11 @@ void add_commands(CLI::App& app, Command& chosen) {
             ->check(CLI::IsMember({1, 9, 25}))
             ->capture_default_str();
         approximate.add_flag("--unit-unknown", o.unit_unknown, "find the size, too");
+        approximate
+            .add_option("--most-triangles", o.most_triangles,
+                        "a finer scan is thinned to about so many")
+            ->check(CLI::PositiveNumber)
+            ->capture_default_str();
       });
 
   add_evidence_commands(app, chosen);

@@ -12,9 +12,9 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "bench/photogrammetry/simulation_truth.h"
 #include "bench/seconds.h"
 #include "core/file.h"
 #include "core/session/image_file.h"
@@ -40,32 +40,19 @@ class StopWatch {
   Seconds began_ = Seconds::now();
 };
 
-Rigid3 pose_of(const nlohmann::json& rows) {
-  Eigen::Matrix<double, 3, 4> matrix;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 4; ++c)
-      matrix(r, c) = rows[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
-  }
-  return Rigid3::from_matrix(matrix);
-}
-
 /// camera_from_board of every view, as the simulation had it; empty without a truth.
 std::vector<Rigid3> true_poses(const Session& session, const fs::path& folder) {
   std::vector<Rigid3> poses;
-  const auto bytes = read_file(folder / "simulation_truth.json");
-  if (!bytes) {
+  const auto truth = read_simulation_truth(folder);
+  if (!truth) {
     for (const SessionView& view : session.views) {
       if (view.camera_from_table) poses.push_back(*view.camera_from_table);
     }
     return poses.size() == session.views.size() ? poses : std::vector<Rigid3>{};
   }
-  const auto truth = nlohmann::json::parse(*bytes);
   for (const SessionView& view : session.views) {
-    for (const auto& camera : truth["cameras"]) {
-      if (camera["id"] != view.camera) continue;
-      poses.push_back(pose_of(camera["camera_from_station"]) *
-                      rotation_about_z(truth["views"][view.image]["table_angle_deg"]));
-    }
+    poses.push_back(truth->camera_from_station.at(view.camera) *
+                    rotation_about_z(truth->table_angle_deg.at(view.image)));
   }
   return poses;
 }

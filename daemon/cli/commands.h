@@ -192,6 +192,7 @@ struct ApproximateCommand {
   bool mean_tissue = false;       ///< the paper's way: the population's mean depths
   bool no_feature_rules = false;  ///< nose and eyes as the model has them
   bool unit_unknown = false;
+  int most_triangles = 4'000'000;  ///< a finer scan is thinned to about so many
 };
 Result<CommandReport> run(const ApproximateCommand&, const CommonOptions&, const Progress&);
 

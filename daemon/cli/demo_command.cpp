@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <nlohmann/json.hpp>
 
-#include "capture/calibration/calibration_file.h"
 #include "capture/scan/contact_sheet.h"
 #include "core/file.h"
 #include "core/random.h"
@@ -22,29 +21,6 @@
 namespace skullstation {
 
 namespace {
-
-/// Lenses first: without them the scale is a tenth of a percent off. A demo that is run again finds
-/// them measured.
-Result<void> calibrate_lenses(const StationConfig& config, const CommonOptions& common,
-                              const Progress& progress) {
-  const auto count = static_cast<double>(config.cameras.size());
-  for (std::size_t i = 0; i < config.cameras.size(); ++i) {
-    const std::string& id = config.cameras[i].id;
-    const auto file = camera_calibration_file(config, id);
-    if (std::filesystem::exists(file)) continue;
-    const double done = static_cast<double>(i) / count;
-    const auto pictures = photograph_board(config, id, {}, common.seed, common.threads,
-                                           progress.part(done, done + 1.0 / count));
-    if (!pictures) return forward(pictures);
-    const auto report = calibrate_from(*pictures, config.board, id);
-    if (!report) return forward(report);
-    if (const auto ready = make_writable_folder(file.parent_path()); !ready) return ready;
-    if (const auto written = write_camera_calibration(report->calibration, file); !written) {
-      return written;
-    }
-  }
-  return {};
-}
 
 /// Someone whom the default model has never seen.
 Person demo_person(const CommonOptions& common) {
@@ -100,7 +76,10 @@ Result<CommandReport> run(const DemoCommand& command, const CommonOptions& commo
   StationConfig config;
   config.simulation.specimen = specimen_file.string();
   config.calibration_folder = (command.out / "calibration").string();
-  if (const auto known = calibrate_lenses(config, common, progress.part(0.0, 0.1)); !known) {
+  // Without the lenses the scale is a tenth of a percent off.
+  if (const auto known =
+          calibrate_lenses(config, common.seed, common.threads, progress.part(0.0, 0.1));
+      !known) {
     return forward(known);
   }
   progress.report(0.1, "making the specimen and opening the station");

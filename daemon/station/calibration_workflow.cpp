@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
+#include "capture/calibration/calibration_file.h"
+#include "core/file.h"
 #include "daemon/station/station.h"
 
 namespace skullstation {
@@ -56,6 +60,27 @@ Result<CameraCalibrationReport> calibrate_from(const BoardPictures& pictures,
   report->calibration.device = pictures.device;
   report->calibration.created = to_iso8601(pictures.taken);
   return report;
+}
+
+Result<void> calibrate_lenses(const StationConfig& config, std::uint64_t seed, int threads,
+                              const Progress& progress) {
+  const auto count = static_cast<double>(config.cameras.size());
+  for (std::size_t i = 0; i < config.cameras.size(); ++i) {
+    const std::string& id = config.cameras[i].id;
+    const auto file = camera_calibration_file(config, id);
+    if (std::filesystem::exists(file)) continue;
+    const double done = static_cast<double>(i) / count;
+    const auto pictures =
+        photograph_board(config, id, {}, seed, threads, progress.part(done, done + 1.0 / count));
+    if (!pictures) return forward(pictures);
+    const auto report = calibrate_from(*pictures, config.board, id);
+    if (!report) return forward(report);
+    if (const auto ready = make_writable_folder(file.parent_path()); !ready) return ready;
+    if (const auto written = write_camera_calibration(report->calibration, file); !written) {
+      return written;
+    }
+  }
+  return {};
 }
 
 }  // namespace skullstation

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -34,5 +35,11 @@ Result<BoardPictures> photograph_board(StationConfig config, const std::string& 
 Result<CameraCalibrationReport> calibrate_from(const BoardPictures& pictures,
                                                const CharucoBoard& board,
                                                const std::string& camera_id);
+
+/// Photographs the board and calibrates the lens of every camera that has no calibration yet, and
+/// keeps the results in the station's calibration folder. For simulated stations: nobody is told
+/// how to hold the board.
+Result<void> calibrate_lenses(const StationConfig& config, std::uint64_t seed, int threads,
+                              const Progress& progress);
 
 }  // namespace skullstation

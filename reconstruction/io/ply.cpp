@@ -237,6 +237,8 @@ class MeshReader {
       return bad_file(name_, "header", "the faces have no integer list \"vertex_indices\"");
     }
     std::vector<double> values(element.properties.size());
+    // A triangle takes at least four bytes, whatever the header claims.
+    corners_.reserve(3 * std::min<std::size_t>(element.count, body_.remaining() / 4));
     for (std::uint64_t face = 0; face < element.count; ++face) {
       if (const auto read = read_record(element, values); !read) return read;
       if (kept_list_.size() < 3) {

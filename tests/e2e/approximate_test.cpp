@@ -158,10 +158,11 @@ TEST(Approximate, IsTheSameBytesForAnyNumberOfThreads) {
   const std::string skull = (folder / "skull.ply").string();
   ASSERT_TRUE(write_ply(mean_skull(), skull));
   for (const char* threads : {"1", "2"}) {
-    const ProcessResult result =
-        skullstation_cli({"approximate", skull, "--out", (folder / threads).string(), "--threads",
-                          threads, "--bmi", "24", "--ancestry", "unknown"});
+    const ProcessResult result = skullstation_cli(
+        {"approximate", skull, "--out", (folder / threads).string(), "--threads", threads, "--bmi",
+         "24", "--ancestry", "unknown", "--most-triangles", "50000"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("triangles were thinned to"));
   }
   int compared = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "1")) {
