@@ -82,7 +82,8 @@ TriangleMesh clustered(const TriangleMesh& mesh, double cell_mm) {
 TriangleMesh thinned(TriangleMesh mesh, Eigen::Index most_triangles) {
   if (mesh.triangles.rows() <= most_triangles) return mesh;
   const double area_mm2 = surface_area(mesh);
-  if (!(area_mm2 > 0.0)) return mesh;
+  // What is no surface is for others to refuse.
+  if (!(area_mm2 > 0.0) || !std::isfinite(area_mm2)) return mesh;
   return clustered(
       mesh, std::sqrt(triangles_a_cell_area * area_mm2 / static_cast<double>(most_triangles)));
 }
