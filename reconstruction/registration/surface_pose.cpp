@@ -19,9 +19,10 @@ using Eigen::Vector3d;
 
 constexpr int kSourcePoints = 3000;
 constexpr int kTargetPoints = 12000;
-/// What opposite normals add to a distance, half of it: a turn by 10 deg weighs as much as 9 mm.
-constexpr double kNormal_mm = 50.0;
-constexpr double kReach_mm = 15.0;
+/// What opposite normals add to a distance, half of it: a turn by 10 deg weighs as much as 7 mm.
+constexpr double kNormal_mm = 40.0;
+/// First what people differ by, then without the pairs that differ most.
+constexpr double kReaches_mm[] = {15.0, 10.0};
 constexpr double kLeastCosine = 0.7;
 constexpr int kMostIterations = 200;
 constexpr double kTolerance_mm = 2e-3;
@@ -35,7 +36,7 @@ struct Partners {
 /// count less (Welsch, scale from the median).
 Partners partners_of(const OrientedPoints& source, const OrientedPoints& target,
                      const OrientedPointTree& tree, const Similarity3& target_from_source,
-                     int threads) {
+                     double reach_mm, int threads) {
   constexpr int block = 128;
   const int count = static_cast<int>(source.size());
   Partners partners{source.positions, Eigen::VectorXd::Zero(count)};
@@ -47,7 +48,7 @@ Partners partners_of(const OrientedPoints& source, const OrientedPoints& target,
       const int near = tree.nearest(moved, normal).index;
       partners.positions.row(i) = target.positions.row(near);
       const double gap = (target.positions.row(near).transpose() - moved).norm();
-      if (gap <= kReach_mm && normal.dot(target.normals.row(near)) >= kLeastCosine) gaps[i] = gap;
+      if (gap <= reach_mm && normal.dot(target.normals.row(near)) >= kLeastCosine) gaps[i] = gap;
     }
   });
   std::vector<double> counted;
@@ -77,14 +78,17 @@ double farthest_move_mm(const Similarity3& a, const Similarity3& b, const Orient
 Similarity3 settle(const OrientedPoints& source, const OrientedPoints& target,
                    Similarity3 target_from_source, int threads) {
   const OrientedPointTree tree(target, kNormal_mm);
-  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
-    const Partners partners = partners_of(source, target, tree, target_from_source, threads);
-    const auto better =
-        fit_similarity(source.positions, partners.positions, partners.weights, FitScale::symmetric);
-    if (!better) break;  // too little is within reach: the pose stands
-    const double move_mm = farthest_move_mm(*better, target_from_source, source);
-    target_from_source = *better;
-    if (move_mm < kTolerance_mm) break;
+  for (const double reach_mm : kReaches_mm) {
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+      const Partners partners =
+          partners_of(source, target, tree, target_from_source, reach_mm, threads);
+      const auto better = fit_similarity(source.positions, partners.positions, partners.weights,
+                                         FitScale::symmetric);
+      if (!better) break;  // too little is within reach: the pose stands
+      const double move_mm = farthest_move_mm(*better, target_from_source, source);
+      target_from_source = *better;
+      if (move_mm < kTolerance_mm) break;
+    }
   }
   return target_from_source;
 }
