@@ -15,7 +15,8 @@ struct SurfacePoseOptions {
 };
 
 /// Where a template lies on an input that shows all or a part of it: input_from_template, a
-/// similarity. From any pose: register_globally, then ICP with the size free.
+/// similarity. From any pose: register_globally, then ICP by place and direction with the size
+/// free. The same for any number of threads.
 Result<Similarity3> find_surface_pose(const TriangleMesh& surface, const TriangleMesh& input,
                                       const SurfacePoseOptions& options);
 
