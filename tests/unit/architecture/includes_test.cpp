@@ -92,6 +92,7 @@ const std::map<std::string, std::set<std::string>> allowed = {
       "capture/simulation",
       "capture/scan",
       "reconstruction/io",
+      "reconstruction/mesh",
       "reconstruction/distance",
       "reconstruction/rendering",
       "reconstruction/photogrammetry",
