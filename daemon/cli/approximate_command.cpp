@@ -31,12 +31,12 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   source.input = command.skull.filename().string();
   source.input_sha256 = *std::move(input_sha256);
   progress.report(0.0, "reading the skull");
-  auto input = read_mesh(command.skull);
-  if (!input) return forward(input);
+  auto scan = read_mesh(command.skull);
+  if (!scan) return forward(scan);
   // Searches in it take ten times the memory of the mesh itself, and a template whose edges are
   // 1.7 mm long gains nothing from finer ones.
-  const Eigen::Index triangles_given = input->triangles.rows();
-  *input = thinned(*std::move(input), command.most_triangles);
+  const Eigen::Index triangles_given = scan->triangles.rows();
+  const TriangleMesh input = thinned(*std::move(scan), command.most_triangles);
   const auto model_source = load_model(command.model);
   if (!model_source) return forward(model_source);
   const FaceModel& model = model_source->model;
@@ -67,11 +67,11 @@ Result<CommandReport> run(const ApproximateCommand& command, const CommonOptions
   fit_options.unit_unknown = command.unit_unknown;
   fit_options.seed = common.seed;
   fit_options.threads = common.threads;
-  auto skull = fit_case_skull(model, *input, fit_options, progress.part(0.05, 0.6));
+  auto skull = fit_case_skull(model, input, fit_options, progress.part(0.05, 0.6));
   if (!skull) return forward(command.skull.string(), skull);
-  if (input->triangles.rows() < triangles_given) {
+  if (input.triangles.rows() < triangles_given) {
     skull->warnings.push_back(fmt::format("The scan's {} triangles were thinned to {}.",
-                                          triangles_given, input->triangles.rows()));
+                                          triangles_given, input.triangles.rows()));
   }
   const auto face = estimate_face(model, *skull, options, progress.part(0.6, 0.75));
   if (!face) return forward(face);

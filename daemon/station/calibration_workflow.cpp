@@ -75,8 +75,8 @@ Result<void> calibrate_lenses(const StationConfig& config, std::uint64_t seed, i
     if (!pictures) return forward(pictures);
     const auto report = calibrate_from(*pictures, config.board, id);
     if (!report) return forward(report);
-    if (const auto ready = make_writable_folder(file.parent_path()); !ready) return ready;
-    if (const auto written = write_camera_calibration(report->calibration, file); !written) {
+    if (auto ready = make_writable_folder(file.parent_path()); !ready) return ready;
+    if (auto written = write_camera_calibration(report->calibration, file); !written) {
       return written;
     }
   }

@@ -199,11 +199,11 @@ class HeadFit {
     const SphereContacts contacts(bone_, radius_mm);
     const Belief drawn = drawn_to_spheres(model_, prior, contacts, bone_, radius_mm,
                                           options_.rounds, options_.threads);
-    const Points3 head = bent_to_spheres(model_, shape_at(model_.head, drawn.mean), contacts,
-                                         radius_mm, options_.rounds, options_.threads);
+    Points3 head = bent_to_spheres(model_, shape_at(model_.head, drawn.mean), contacts, radius_mm,
+                                   options_.rounds, options_.threads);
     if (features_.empty()) return head;
     const Eigen::VectorXd sd_mm = band_mm(model_, prior.covariance, head) / gaussian_80;
-    return drawn_to_features(model_.head_template, head, sd_mm, features_);
+    return drawn_to_features(model_.head_template, std::move(head), sd_mm, features_);
   }
 
  private:

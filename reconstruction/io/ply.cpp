@@ -160,7 +160,9 @@ class MeshReader {
       if (!property.list_count) continue;
       if (*value < 0.0) return bad_file(name_, body_.place(), "a list has a negative length");
       list_.clear();
-      for (double k = 0; k < *value; ++k) {
+      // What is longer than its file ends early.
+      const auto length = static_cast<std::uint64_t>(std::min(*value, 1e15));
+      for (std::uint64_t k = 0; k < length; ++k) {
         const auto item = body_.next(property.type);
         if (!item) return truncated();
         list_.push_back(*item);
@@ -174,7 +176,7 @@ class MeshReader {
     std::vector<double> values(element.properties.size());
     list_property_ = -1;
     for (std::uint64_t i = 0; i < element.count; ++i) {
-      if (const auto read = read_record(element, values); !read) return read;
+      if (auto read = read_record(element, values); !read) return read;
     }
     return {};
   }
@@ -202,7 +204,7 @@ class MeshReader {
     std::vector<double> values(element.properties.size());
     list_property_ = -1;
     for (Eigen::Index row = 0; row < rows; ++row) {
-      if (const auto read = read_record(element, values); !read) return read;
+      if (auto read = read_record(element, values); !read) return read;
       for (int axis = 0; axis < 3; ++axis) {
         const double coordinate = values[position[axis]];
         if (!std::isfinite(coordinate)) {
@@ -240,7 +242,7 @@ class MeshReader {
     // A triangle takes at least four bytes, whatever the header claims.
     corners_.reserve(3 * std::min<std::size_t>(element.count, body_.remaining() / 4));
     for (std::uint64_t face = 0; face < element.count; ++face) {
-      if (const auto read = read_record(element, values); !read) return read;
+      if (auto read = read_record(element, values); !read) return read;
       if (kept_list_.size() < 3) {
         return bad_file(name_, body_.place(),
                         fmt::format("face {} has {} corners", face, kept_list_.size()));

@@ -9,6 +9,7 @@
 #include "core/units.h"
 #include "reconstruction/registration/affine_fit.h"
 #include "reconstruction/registration/point_icp.h"
+#include "reconstruction/registration/similarity_fit.h"
 
 namespace skullstation {
 
@@ -152,8 +153,38 @@ std::optional<Similarity3> align_part(const OrientedPoints& points, const Target
   return best;
 }
 
-/// The mandible closed and opened about the axis through its condyles, and following the upper
-/// teeth. `cranium` is where the unbent one lies, `bent` where its vertices are.
+/// How the bending of the cranium moves what the mandible hangs on: both joints and the upper
+/// teeth, each counting alike. Of a long face the teeth go down and the joints stay.
+Similarity3 following_cranium(const SkullTemplate& skull, const TriangleMesh& surface,
+                              const Eigen::Affine3d& cranium, const Points3& bent,
+                              const Eigen::Vector3d& left, const Eigen::Vector3d& right) {
+  constexpr double kJoint_mm = 12.0;
+  std::vector<int> members[3];
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    const SkullRegion region = skull.region[static_cast<std::size_t>(v)];
+    if (bone_of(region) != SkullBone::cranium) continue;
+    const Eigen::Vector3d place = surface.vertices.row(v);
+    if (region == upper_teeth) members[0].push_back(v);
+    if ((place - left).norm() < kJoint_mm) members[1].push_back(v);
+    if ((place - right).norm() < kJoint_mm) members[2].push_back(v);
+  }
+  const std::size_t count = members[0].size() + members[1].size() + members[2].size();
+  Points3 from(static_cast<Eigen::Index>(count), 3);
+  Points3 to(from.rows(), 3);
+  Eigen::VectorXd weights(from.rows());
+  Eigen::Index row = 0;
+  for (const std::vector<int>& of_place : members) {
+    for (const int v : of_place) {
+      from.row(row) = (cranium * Eigen::Vector3d(surface.vertices.row(v))).transpose();
+      to.row(row) = bent.row(v);
+      weights[row++] = 1.0 / static_cast<double>(of_place.size());
+    }
+  }
+  return fit_similarity(from, to, weights, FitScale::to_target).value_or(Similarity3{});
+}
+
+/// The mandible closed and opened about the axis through its condyles, lower down, and following
+/// the cranium. `cranium` is where the unbent one lies, `bent` where its vertices are.
 std::vector<Similarity3> mandible_starts(const SkullTemplate& skull, const TriangleMesh& surface,
                                          const Eigen::Affine3d& cranium, const Points3& bent) {
   std::vector<Similarity3> starts;
@@ -169,26 +200,17 @@ std::vector<Similarity3> mandible_starts(const SkullTemplate& skull, const Trian
   if (!left || !right) return {Similarity3{}};
   const Eigen::Vector3d hinge = cranium * Eigen::Vector3d(0.5 * (*left + *right));
   const Eigen::Vector3d axis = (*left - *right).normalized();
-  Eigen::Vector3d teeth_moved = Eigen::Vector3d::Zero();
-  int teeth = 0;
-  for (int v = 0; v < skull.boundary_count; ++v) {
-    if (skull.region[static_cast<std::size_t>(v)] != upper_teeth) continue;
-    teeth_moved +=
-        bent.row(v).transpose() - cranium * Eigen::Vector3d(surface.vertices.row(v).transpose());
-    ++teeth;
-  }
-  teeth_moved /= std::max(1, teeth);
+  const Similarity3 following = following_cranium(skull, surface, cranium, bent, *left, *right);
   for (const double opening_deg : {0.0, 10.0, 20.0}) {
+    Similarity3 opened;
+    opened.rotation = Eigen::AngleAxisd(radians(opening_deg), axis);
+    opened.translation = hinge - opened.rotation * hinge;
     for (const double drop_mm : {0.0, 10.0, 20.0}) {  // a longer face, a thick disc in the joint
-      Similarity3 start;
-      start.rotation = Eigen::AngleAxisd(radians(opening_deg), axis);
-      start.translation = hinge - start.rotation * hinge - drop_mm * Eigen::Vector3d::UnitZ();
+      Similarity3 start = opened;
+      start.translation -= drop_mm * Eigen::Vector3d::UnitZ();
       starts.push_back(start);
     }
-    Similarity3 start;
-    start.rotation = Eigen::AngleAxisd(radians(opening_deg), axis);
-    start.translation = hinge - start.rotation * hinge + teeth_moved;
-    starts.push_back(start);
+    starts.push_back(following * opened);
   }
   return starts;
 }
