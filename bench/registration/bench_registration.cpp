@@ -91,7 +91,6 @@ int bench_skulls(const SkullTemplate& skull, int people, std::uint64_t seed) {
       fmt::print("| {} | {} |\n", i + 1, fit.error().message());
       continue;
     }
-    const SpaceWarp& warp = person.bone.person_from_canonical;
     double outer = 0.0;
     double face = 0.0;
     int outer_count = 0;
@@ -101,8 +100,7 @@ int bench_skulls(const SkullTemplate& skull, int people, std::uint64_t seed) {
       if (!skull.outer[at]) continue;
       const Eigen::Vector3d vertex = skull.vertices.row(v);
       const bool lower = bone_of(skull.region[at]) == SkullBone::mandible;
-      const Eigen::Vector3d truth =
-          pose * warp(lower ? person.bone.open_from_closed * vertex : vertex);
+      const Eigen::Vector3d truth = pose * person.bone.on_person(vertex, lower);
       const double error = (fit->vertices.row(v).transpose() - truth).norm();
       outer += error;
       ++outer_count;
@@ -115,8 +113,7 @@ int bench_skulls(const SkullTemplate& skull, int people, std::uint64_t seed) {
       const Eigen::Vector3d place = landmark.place.position(skull.vertices);
       const auto corner = static_cast<std::size_t>(landmark.place.corners[0]);
       const bool lower = bone_of(skull.region[corner]) == SkullBone::mandible;
-      const Eigen::Vector3d truth =
-          pose * warp(lower ? person.bone.open_from_closed * place : place);
+      const Eigen::Vector3d truth = pose * person.bone.on_person(place, lower);
       landmarks += (landmark.place.position(fit->vertices) - truth).norm();
     }
     const std::vector<double> row = {fit->quality.facial.mean_mm,

@@ -29,9 +29,7 @@ Points3 vertices_of(const Person& person, const SkullTemplate& skull) {
   for (Eigen::Index v = 0; v < vertices.rows(); ++v) {
     const Eigen::Vector3d place = skull.vertices.row(v);
     const bool lower = bone_of(skull.region[static_cast<std::size_t>(v)]) == SkullBone::mandible;
-    const Eigen::Vector3d there =
-        person.bone.person_from_canonical(lower ? person.bone.open_from_closed * place : place);
-    vertices.row(v) = there;
+    vertices.row(v) = person.bone.on_person(place, lower).transpose();
   }
   return vertices;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "reconstruction/mesh/flat_cuts.h"
+#include "reconstruction/registration/observed_bone.h"
 #include "reconstruction/registration/similarity_fit.h"
 #include "reconstruction/statistics/population.h"
 #include "reconstruction/statistics/skull_completion.h"

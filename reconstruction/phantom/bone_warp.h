@@ -20,6 +20,12 @@ int landmark_index(const std::vector<Landmark>& landmarks, std::string_view name
 struct BoneWarp {
   SpaceWarp person_from_canonical;  ///< ends in the person's own anatomical frame
   Rigid3 open_from_closed;          ///< how the canonical mandible is turned before it is warped
+
+  /// Where a point of the canonical skull, its mandible closed, lies on the person.
+  Eigen::Vector3d on_person(const Eigen::Vector3d& canonical, bool on_mandible) const {
+    return person_from_canonical(on_mandible ? open_from_closed * canonical : canonical);
+  }
+
   std::vector<Landmark> landmarks;  ///< the person's, in the canonical order
   /// Where each landmark lies on the canonical skull: extremes are others than the canonical ones.
   std::vector<Eigen::Vector3d> canonical_mm;

@@ -45,14 +45,13 @@ Person PersonMaker::make(const PersonParameters& parameters, int threads) const 
   person.face = face_model_.fit(parameters, person.bone, threads);
   const SpaceWarp& bone = person.bone.person_from_canonical;
   const SpaceWarp& face = person.face.face_from_canonical;
-  const Rigid3& opening = person.bone.open_from_closed;
   const std::vector<int>& missing = parameters.missing_teeth;
   const TriangleMesh healed =
       missing.empty() ? TriangleMesh{}
                       : with_healed_sockets(skull_, cranium_vertices_, missing, threads);
   person.skull =
       moved(missing.empty() ? skull_ : healed, threads, [&](int v, const Eigen::Vector3d& vertex) {
-        return bone(v < cranium_vertices_ ? vertex : opening * vertex);
+        return person.bone.on_person(vertex, v >= cranium_vertices_);
       });
   person.cranium_vertices = cranium_vertices_;
   person.skin =

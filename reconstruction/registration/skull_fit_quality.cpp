@@ -5,7 +5,7 @@
 
 #include "core/parallel.h"
 #include "reconstruction/distance/triangle_bvh.h"
-#include "reconstruction/registration/point_tree.h"
+#include "reconstruction/registration/observed_bone.h"
 #include "reconstruction/rendering/outside.h"
 
 namespace skullstation {
@@ -20,29 +20,8 @@ constexpr int kMeasured = 60000;
 /// Rays over the whole sphere to learn whether a vertex of the input lies on its outside.
 constexpr int kDirections = 100;
 constexpr int kChunk = 512;
-/// Of an outer vertex, within about 8 mm.
-constexpr int kNeighbours = 24;
-
-/// The observed vertices but for those most of whose neighbours were not: a missing bone's that
-/// came to lie on another by chance.
-std::vector<bool> without_islands(const SkullTemplate& skull, const std::vector<char>& observed) {
-  std::vector<int> outer;
-  for (int v = 0; v < skull.boundary_count; ++v) {
-    if (skull.outer[static_cast<std::size_t>(v)]) outer.push_back(v);
-  }
-  std::vector<bool> result(observed.begin(), observed.end());
-  const PointTree tree(skull.vertices(outer, Eigen::all));
-  for (const int v : outer) {
-    const auto at = static_cast<std::size_t>(v);
-    if (observed[at] == 0) continue;
-    const auto around = tree.nearest(skull.vertices.row(v).transpose(), kNeighbours);
-    const auto seen = std::ranges::count_if(around, [&](const NearPoint& near) {
-      return observed[static_cast<std::size_t>(outer[static_cast<std::size_t>(near.index)])] != 0;
-    });
-    result[at] = 2 * seen >= static_cast<std::ptrdiff_t>(around.size());
-  }
-  return result;
-}
+/// Share of the mandible that has to be observed for there to be one.
+constexpr double kLeastMandible = 0.2;
 
 }  // namespace
 
@@ -93,25 +72,21 @@ void measure_skull_fit(const SkullTemplate& skull, const Points3& vertices,
       observed[at] = hit.valid && shows(hit, v);
     }
   });
-  fitted.observed = without_islands(skull, observed);
-  const Eigen::VectorXd area = vertex_areas(surface_of(skull, skull.vertices));
-  double outer = 0.0;
-  double seen = 0.0;
-  double mandible = 0.0;
-  double mandible_seen = 0.0;
+  // Islands of a missing bone that came to lie on another are no bone.
+  fitted.observed.assign(observed.begin(), observed.end());
+  const Eigen::VectorXd around = observed_around(skull, fitted.observed);
   for (std::size_t v = 0; v < count; ++v) {
-    if (!skull.outer[v]) continue;
-    const double of_all = area[static_cast<Eigen::Index>(v)];
-    const double of_mandible = bone_of(skull.region[v]) == SkullBone::mandible ? of_all : 0.0;
-    outer += of_all;
-    mandible += of_mandible;
-    if (!fitted.observed[v]) continue;
-    seen += of_all;
-    mandible_seen += of_mandible;
+    if (around[static_cast<Eigen::Index>(v)] < 0.5) fitted.observed[v] = false;
   }
   SkullFitQuality& quality = fitted.quality;
-  quality.observed_share = outer > 0.0 ? seen / outer : 0.0;
-  quality.mandible_observed_share = mandible > 0.0 ? mandible_seen / mandible : 0.0;
+  quality.mandible_observed_share = observed_share(skull, fitted.observed, SkullBone::mandible);
+  if (quality.mandible_observed_share < kLeastMandible) {
+    quality.mandible_observed_share = 0.0;
+    for (std::size_t v = 0; v < count; ++v) {
+      if (bone_of(skull.region[v]) == SkullBone::mandible) fitted.observed[v] = false;
+    }
+  }
+  quality.observed_share = observed_share(skull, fitted.observed);
 
   const auto points = static_cast<int>(input.mesh().vertices.rows());
   const int stride = std::max(1, points / kMeasured);

@@ -64,8 +64,6 @@ constexpr double kHold = 1e-4;
 constexpr double kTangentialShare = 0.02;
 /// No tetrahedron may keep less of its rest volume.
 constexpr double kLeastVolumeShare = 0.05;
-/// Share of the mandible that has to be observed for there to be one.
-constexpr double kLeastMandible = 0.2;
 /// Of the paper's volume term, relative to a level's smoothness: chosen for the best fit on
 /// phantoms, see docs/registration.md.
 constexpr double kVolumePerSmooth = 1e-9;
@@ -351,12 +349,8 @@ Result<FittedSkull> register_skull(const SkullTemplate& skull, const TriangleMes
       fit_similarity(skull.vertices.topRows(skull.boundary_count),
                      fitted.vertices.topRows(skull.boundary_count), {}, FitScale::to_target);
   fitted.input_from_template = similarity.value_or(pose);
-  if (fitted.quality.mandible_observed_share < kLeastMandible) {
+  if (fitted.quality.mandible_observed_share == 0.0) {
     fitted.warnings.push_back("no mandible in the input: it lies where the cranium puts it");
-    for (int v = 0; v < skull.boundary_count; ++v) {
-      const auto at = static_cast<std::size_t>(v);
-      if (bone_of(skull.region[at]) == SkullBone::mandible) fitted.observed[at] = false;
-    }
   }
   if (fitted.quality.observed_share < 0.6) {
     fitted.warnings.push_back(fmt::format("the input shows {:.0f} % of the skull's outside only",

@@ -39,7 +39,7 @@ struct SkullFitQuality {
   int inverted_tetrahedra = 0;       ///< never more than 0
   double least_scaled_volume = 0.0;  ///< least volume of a tetrahedron in units of its rest volume
   double observed_share = 0.0;       ///< of the template's outer surface
-  double mandible_observed_share = 0.0;
+  double mandible_observed_share = 0.0;  ///< 0 if less than a fifth: then there is none
 };
 
 /// A template skull on an input skull.

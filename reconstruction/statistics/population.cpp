@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruction/registration/observed_bone.h"
 #include "reconstruction/registration/similarity_fit.h"
 #include "reconstruction/statistics/skull_completion.h"
 
@@ -114,22 +115,6 @@ Result<std::vector<ModelSubject>> aligned_population(const SkullTemplate& skull,
     }
   }
   return subjects;
-}
-
-std::vector<int> observed_outer(const SkullTemplate& skull, const std::vector<bool>& observed) {
-  std::vector<int> vertices;
-  for (int v = 0; v < skull.boundary_count; ++v) {
-    const auto i = static_cast<std::size_t>(v);
-    if (skull.outer[i] && observed[i]) vertices.push_back(v);
-  }
-  return vertices;
-}
-
-double observed_share(const SkullTemplate& skull, const std::vector<bool>& observed) {
-  const Eigen::VectorXd weights = skull_weights(skull);
-  double seen = 0.0;
-  for (const int v : observed_outer(skull, observed)) seen += weights[v];
-  return seen / weights.sum();
 }
 
 Belief skull_belief(const SkullTemplate& skull, const ShapeModel& model, const Points3& vertices,

@@ -36,12 +36,6 @@ Result<std::vector<ModelSubject>> aligned_population(const SkullTemplate& skull,
                                                      const HeadTemplate& head,
                                                      std::vector<ModelSubject> subjects);
 
-/// Outer surface vertices that were observed.
-std::vector<int> observed_outer(const SkullTemplate& skull, const std::vector<bool>& observed);
-
-/// Share of the template's outer surface that was observed.
-double observed_share(const SkullTemplate& skull, const std::vector<bool>& observed);
-
 /// What the observed outer vertices of a fitted skull (#V x 3, aligned) tell about its
 /// coefficients.
 Belief skull_belief(const SkullTemplate& skull, const ShapeModel& model, const Points3& vertices,

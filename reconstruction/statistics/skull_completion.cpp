@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "reconstruction/registration/observed_bone.h"
 #include "reconstruction/registration/point_tree.h"
 #include "reconstruction/statistics/population.h"
 
@@ -54,21 +55,11 @@ std::vector<int> thinned(const std::vector<int>& vertices, std::size_t count) {
 /// is. A foramen that a fit does not find is no break: most of the bone around it is there.
 VectorXd distance_to_break_mm(const SkullTemplate& skull, const std::vector<bool>& observed,
                               const std::vector<int>& vertices) {
-  constexpr int neighbours = 24;
-  std::vector<int> outer;
-  for (int v = 0; v < skull.boundary_count; ++v) {
-    if (skull.outer[static_cast<std::size_t>(v)]) outer.push_back(v);
-  }
-  const auto missing = [&](int v) { return !observed[static_cast<std::size_t>(v)]; };
-  const PointTree near_outer(skull.vertices(outer, Eigen::all));
+  const VectorXd around = observed_around(skull, observed);
   std::vector<int> broken;
-  for (const int v : outer) {
-    if (!missing(v)) continue;
-    const auto around = near_outer.nearest(skull.vertices.row(v).transpose(), neighbours);
-    const auto gone = std::ranges::count_if(around, [&](const NearPoint& near) {
-      return missing(outer[static_cast<std::size_t>(near.index)]);
-    });
-    if (2 * gone >= static_cast<std::ptrdiff_t>(around.size())) broken.push_back(v);
+  for (int v = 0; v < skull.boundary_count; ++v) {
+    const auto at = static_cast<std::size_t>(v);
+    if (skull.outer[at] && !observed[at] && around[v] <= 0.5) broken.push_back(v);
   }
   VectorXd distance_mm = VectorXd::Constant(static_cast<Index>(vertices.size()),
                                             std::numeric_limits<double>::infinity());

@@ -40,12 +40,11 @@ HeadRegistrationOptions head_options() {
   return options;
 }
 
-/// Where a vertex of the template lies on the canonical skull with this person's jaw.
-Eigen::Vector3d closed_or_open(int v) {
-  const Eigen::Vector3d vertex = skull_template().vertices.row(v);
+/// Where a vertex of the template belongs on this person.
+Eigen::Vector3d on_person(int v) {
   const bool lower =
       bone_of(skull_template().region[static_cast<std::size_t>(v)]) == SkullBone::mandible;
-  return lower ? person().bone.open_from_closed * vertex : vertex;
+  return person().bone.on_person(skull_template().vertices.row(v), lower);
 }
 
 Similarity3 some_pose() {
@@ -76,7 +75,7 @@ TEST(SkullRegistration, FindsAPersonsSkullInAnyPose) {
   int count = 0;
   for (int v = 0; v < skull_template().boundary_count; ++v) {
     if (!skull_template().outer[static_cast<std::size_t>(v)]) continue;
-    const Eigen::Vector3d truth = pose * person().bone.person_from_canonical(closed_or_open(v));
+    const Eigen::Vector3d truth = pose * on_person(v);
     sum += (fit->vertices.row(v).transpose() - truth).norm();
     ++count;
   }
