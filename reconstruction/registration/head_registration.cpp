@@ -7,12 +7,10 @@
 #include <cmath>
 #include <utility>
 
-#include "core/parallel.h"
-#include "core/units.h"
 #include "reconstruction/mesh/mesh_topology.h"
 #include "reconstruction/registration/bending_energy.h"
 #include "reconstruction/registration/head_fit_quality.h"
-#include "reconstruction/registration/head_sheet.h"
+#include "reconstruction/registration/head_pairs.h"
 #include "reconstruction/registration/input_check.h"
 #include "reconstruction/registration/oriented_points.h"
 #include "reconstruction/registration/point_tree.h"
@@ -25,29 +23,28 @@ namespace {
 
 using Matrix = Eigen::SparseMatrix<double>;
 
-/// A stretch of iterations at one stiffness: pairs farther apart, or with normals that differ more,
-/// do not count; landmarks of `landmark_weight`, all of them together, in units of all points'.
+enum class Pairs { alike, nearest, sliding };  ///< the last from all points
+
+/// A stretch of iterations at one stiffness; landmarks of `landmark_weight`, all of them together,
+/// in units of all points'.
 struct Level {
   double bending_mm4;
-  double distance_mm;
-  double normal_deg;
+  Pairs pairs;
+  HeadPairLimits limits;
   double landmark_weight;
   int iterations;
-  bool fine;  ///< on all points, sliding along the surface
 };
 
 /// Stiff to soft; the fourth root is about the length over which the skin may bend.
 constexpr Level kLevels[] = {
-    {1e6, 20.0, 60.0, 10.0, 4, false}, {1e5, 14.0, 55.0, 5.0, 4, false},
-    {1e4, 10.0, 50.0, 1.0, 4, false},  {1e3, 7.0, 45.0, 0.5, 4, false},
-    {1e2, 5.0, 45.0, 0.2, 3, false},   {1e1, 4.0, 40.0, 0.1, 3, false},
-    {1.0, 3.0, 40.0, 0.02, 3, true},   {0.1, 2.0, 40.0, 0.0, 3, true},
+    {1e6, Pairs::alike, {20.0, 60.0}, 10.0, 8},  {1e5, Pairs::alike, {14.0, 55.0}, 5.0, 8},
+    {1e4, Pairs::alike, {10.0, 50.0}, 1.0, 8},   {1e3, Pairs::alike, {7.0, 45.0}, 0.5, 8},
+    {1e2, Pairs::alike, {5.0, 45.0}, 0.2, 8},    {1e1, Pairs::nearest, {4.0, 40.0}, 0.1, 3},
+    {1.0, Pairs::sliding, {3.0, 40.0}, 0.02, 3}, {0.1, Pairs::sliding, {2.0, 40.0}, 0.0, 3},
 };
 constexpr double kCoarseSpacing_mm = 4.0;
 constexpr double kFineSpacing_mm = 1.5;
 constexpr double kTangentialShare = 0.15;
-constexpr double kLeastScale_mm = 0.3;
-constexpr int kChunk = 256;
 
 Result<ScanPoints> scan_points(const TriangleMesh& scan, const std::vector<double>& vertex_weight,
                                double spacing_mm) {
@@ -95,8 +92,8 @@ class Fit {
       stage.last_move_mm = (vertices_ - before).rowwise().norm().mean();
       if (stage.last_move_mm < 0.005) break;
     }
-    stage.correspondences = count_;
-    stage.rms_mm = rms_mm_;
+    stage.correspondences = distances_.count;
+    stage.rms_mm = distances_.rms_mm;
     stage.processor_seconds = processor_seconds() - began_s;
     stages_.push_back(std::move(stage));
   }
@@ -105,74 +102,30 @@ class Fit {
   FitStages take_stages() { return std::move(stages_); }
 
  private:
-  struct Pull {
-    SurfacePoint place;
-    Eigen::Vector3d target = Eigen::Vector3d::Zero();
-    double weight = 0.0;
-  };
   struct PlacedLandmark {
     SurfacePoint place;
     Eigen::Vector3d position_mm;
   };
 
   void pair_up(const ScanPoints& scan, const Level& level) {
-    const HeadSheet sheet(head_, vertices_, rim_);
-    const double least_cosine = std::cos(radians(level.normal_deg));
-    pulls_.assign(static_cast<std::size_t>(scan.points.size()), {});
-    std::vector<double> gaps(pulls_.size(), -1.0);
-    const auto count = static_cast<int>(pulls_.size());
-    parallel_for((count + kChunk - 1) / kChunk, options_.threads, [&](int chunk) {
-      for (int i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
-        const Eigen::Vector3d query = scan.points.positions.row(i);
-        const SheetHit hit = sheet.nearest(query);
-        if (hit.distance_mm > level.distance_mm || hit.beyond_edge ||
-            hit.normal.dot(scan.points.normals.row(i).transpose()) < least_cosine) {
-          continue;
-        }
-        Pull& pull = pulls_[static_cast<std::size_t>(i)];
-        pull.place = hit.place;
-        pull.target = query;
-        if (level.fine) {
-          const Eigen::Vector3d normal = scan.points.normals.row(i);
-          const Eigen::Vector3d gap = query - hit.point;
-          const Eigen::Vector3d across = gap.dot(normal) * normal;
-          pull.target = hit.point + across + kTangentialShare * (gap - across);
-        }
-        double believed = 0.0;
-        for (int k = 0; k < 3; ++k) {
-          believed += hit.place.weights[k] *
-                      head_.data_weight[static_cast<std::size_t>(hit.place.corners[k])];
-        }
-        pull.weight = scan.weight[i] * std::clamp(believed, 0.0, 1.0);
-        gaps[static_cast<std::size_t>(i)] = hit.distance_mm;
-      }
-    });
-    std::vector<double> kept;
-    double squares = 0.0;
-    for (const double gap : gaps) {
-      if (gap < 0.0) continue;
-      kept.push_back(gap);
-      squares += gap * gap;
+    const int threads = options_.threads;
+    if (level.pairs == Pairs::alike) {
+      pairs_ = alike_pairs(head_, vertices_, rim_, scan, level.limits, threads);
+    } else {
+      const double tangential = level.pairs == Pairs::sliding ? kTangentialShare : 1.0;
+      pairs_ = nearest_pairs(head_, vertices_, rim_, scan, level.limits, tangential, threads);
     }
-    count_ = static_cast<int>(kept.size());
-    if (kept.empty()) return;
-    rms_mm_ = std::sqrt(squares / count_);
-    const auto middle = kept.begin() + static_cast<std::ptrdiff_t>(kept.size() / 2);
-    std::nth_element(kept.begin(), middle, kept.end());
-    const double nu = std::max(4.0 * *middle, kLeastScale_mm);
-    for (std::size_t i = 0; i < gaps.size(); ++i) {
-      if (gaps[i] >= 0.0) pulls_[i].weight *= std::exp(-0.5 * gaps[i] * gaps[i] / (nu * nu));
-    }
+    distances_ = weigh(pairs_, vertices_);
   }
 
   void solve(const Level& level, const std::vector<EdgeFlap>& flaps, const Matrix& bending,
              const Points3& rest) {
     const Eigen::Index count = vertices_.rows();
     double all = 0.0;
-    for (const Pull& pull : pulls_) all += pull.weight;
+    for (const HeadPair& pair : pairs_) all += pair.weight;
     if (all <= 0.0) return;
     std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve(9 * pulls_.size());
+    entries.reserve(9 * pairs_.size());
     Points3 right = level.bending_mm4 * rotated_rest_pull(flaps, rest, vertices_, options_.threads);
     const auto add = [&](const SurfacePoint& place, const Eigen::Vector3d& target, double weight) {
       for (int i = 0; i < 3; ++i) {
@@ -183,8 +136,8 @@ class Fit {
         right.row(place.corners[i]) += weight * place.weights[i] * target.transpose();
       }
     };
-    for (const Pull& pull : pulls_) {
-      if (pull.weight > 0.0) add(pull.place, pull.target, pull.weight / all);
+    for (const HeadPair& pair : pairs_) {
+      if (pair.weight > 0.0) add(pair.place, pair.target, pair.weight / all);
     }
     for (const PlacedLandmark& landmark : landmarks_) {
       add(landmark.place, landmark.position_mm,
@@ -211,9 +164,8 @@ class Fit {
   std::vector<bool> rim_;
   std::vector<PlacedLandmark> landmarks_;
   Points3 vertices_;
-  std::vector<Pull> pulls_;
-  int count_ = 0;
-  double rms_mm_ = 0.0;
+  std::vector<HeadPair> pairs_;
+  HeadPairDistances distances_;
   FitStages stages_;
 };
 
@@ -298,7 +250,7 @@ Result<FittedHead> register_head(const HeadTemplate& head, const TriangleMesh& i
     if (progress.stop.stop_requested()) return fail(ErrorKind::cancelled, "head", "cancelled");
     progress.report(0.2 + 0.7 * number++ / static_cast<double>(std::size(kLevels)),
                     "fitting the skin");
-    fit.run(level, level.fine ? *fine : *coarse);
+    fit.run(level, level.pairs == Pairs::sliding ? *fine : *coarse);
   }
   measure_head_fit(head, fit.vertices(), scan, *fine, options.threads, fitted);
   for (FitStage& stage : fit.take_stages()) fitted.stages.push_back(std::move(stage));
