@@ -13,8 +13,6 @@ namespace skullstation {
 
 namespace {
 
-/// What opposite normals add to a distance, half of it. Chosen on phantoms, docs/registration.md.
-constexpr double kNormal_mm = 40.0;
 constexpr double kLeastScale_mm = 0.3;
 constexpr int kChunk = 256;
 
@@ -35,7 +33,7 @@ std::vector<HeadPair> alike_pairs(const HeadTemplate& head, const Points3& verti
   const double least_cosine = std::cos(radians(limits.normal_deg));
   const auto count = static_cast<int>(points.size());
   std::vector<HeadPair> pairs(static_cast<std::size_t>(count));
-  const OrientedPointTree tree({surface.vertices, surface.normals}, kNormal_mm);
+  const OrientedPointTree tree({surface.vertices, surface.normals});
   for_each_of(count, threads, [&](int i) {
     const int v = tree.nearest(points.positions.row(i), points.normals.row(i)).index;
     const auto at = static_cast<std::size_t>(v);
@@ -69,8 +67,8 @@ std::vector<HeadPair> nearest_pairs(const HeadTemplate& head, const Points3& ver
     }
     double believed = 0.0;
     for (int k = 0; k < 3; ++k) {
-      believed += hit.place.weights[k] *
-                  head.data_weight[static_cast<std::size_t>(hit.place.corners[k])];
+      believed +=
+          hit.place.weights[k] * head.data_weight[static_cast<std::size_t>(hit.place.corners[k])];
     }
     const Eigen::Vector3d gap = query - hit.point;
     const Eigen::Vector3d across = gap.dot(normal) * normal;

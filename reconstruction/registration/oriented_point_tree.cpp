@@ -23,30 +23,28 @@ struct Cloud {
 using Tree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud, 6, int>;
 
-Rows6 rows_of(const OrientedPoints& points, double normal_mm) {
+Rows6 rows_of(const OrientedPoints& points) {
   Rows6 rows(points.size(), 6);
-  rows << points.positions, normal_mm * points.normals;
+  rows << points.positions, OrientedPointTree::normal_mm * points.normals;
   return rows;
 }
 
 }  // namespace
 
 struct OrientedPointTree::Index {
-  Index(const OrientedPoints& points, double normal_scale_mm)
-      : cloud{rows_of(points, normal_scale_mm)}, tree(6, cloud), normal_mm(normal_scale_mm) {}
+  explicit Index(const OrientedPoints& points) : cloud{rows_of(points)}, tree(6, cloud) {}
   Cloud cloud;
   Tree tree;
-  double normal_mm;
 };
 
-OrientedPointTree::OrientedPointTree(const OrientedPoints& points, double normal_mm)
-    : index_(std::make_unique<Index>(points, normal_mm)) {}
+OrientedPointTree::OrientedPointTree(const OrientedPoints& points)
+    : index_(std::make_unique<Index>(points)) {}
 OrientedPointTree::~OrientedPointTree() = default;
 
 NearPoint OrientedPointTree::nearest(const Eigen::Vector3d& position,
                                      const Eigen::Vector3d& normal) const {
   Eigen::Matrix<double, 6, 1> query;
-  query << position, index_->normal_mm * normal;
+  query << position, normal_mm * normal;
   NearPoint found;
   index_->tree.knnSearch(query.data(), 1, &found.index, &found.squared_distance);
   return found;

@@ -12,7 +12,10 @@ namespace skullstation {
 /// template's finds the template's end, not its flank. Queries may run on several threads.
 class OrientedPointTree {
  public:
-  OrientedPointTree(const OrientedPoints& points, double normal_mm);
+  /// A turn by 10 deg counts as much as 7 mm: best of those tried, docs/registration.md.
+  static constexpr double normal_mm = 40.0;
+
+  explicit OrientedPointTree(const OrientedPoints& points);
   ~OrientedPointTree();
 
   /// `index` is -1 where there are no points.

@@ -13,8 +13,6 @@ namespace skullstation {
 namespace {
 
 constexpr double kToothWeight = 0.3;
-/// What opposite normals add to a distance, half of it.
-constexpr double kNormal_mm = 10.0;
 constexpr int kChunk = 512;
 
 template <class Work>
@@ -114,8 +112,8 @@ SkullPairs far_pairs(const SkullState& state, const InputSurface& input, const P
                limits.distance_mm &&
            state.surface.normals.row(v).dot(samples.normals.row(sample)) >= least_cosine;
   };
-  const OrientedPointTree own({state.surface.vertices, state.surface.normals}, kNormal_mm);
-  const OrientedPointTree theirs(samples, kNormal_mm);
+  const OrientedPointTree own({state.surface.vertices, state.surface.normals});
+  const OrientedPointTree theirs(samples);
   std::vector<int> chosen(static_cast<std::size_t>(samples.size()), -1);
   for_each_vertex(static_cast<int>(samples.size()), threads, [&](int i) {
     const int v = own.nearest(samples.positions.row(i), samples.normals.row(i)).index;

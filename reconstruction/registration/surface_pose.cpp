@@ -19,8 +19,6 @@ using Eigen::Vector3d;
 
 constexpr int kSourcePoints = 3000;
 constexpr int kTargetPoints = 12000;
-/// What opposite normals add to a distance, half of it: a turn by 10 deg weighs as much as 7 mm.
-constexpr double kNormal_mm = 40.0;
 /// First what people differ by, then without the pairs that differ most.
 constexpr double kReaches_mm[] = {15.0, 10.0};
 constexpr double kLeastCosine = 0.7;
@@ -77,7 +75,7 @@ double farthest_move_mm(const Similarity3& a, const Similarity3& b, const Orient
 /// small tolerance.
 Similarity3 settle(const OrientedPoints& source, const OrientedPoints& target,
                    Similarity3 target_from_source, int threads) {
-  const OrientedPointTree tree(target, kNormal_mm);
+  const OrientedPointTree tree(target);
   for (const double reach_mm : kReaches_mm) {
     for (int iteration = 0; iteration < kMostIterations; ++iteration) {
       const Partners partners =

@@ -44,13 +44,13 @@ TEST(OrientedPointTree, AgreesWithASearchOfAllPoints) {
   };
   OrientedPoints points{Points3(400, 3), Points3(400, 3)};
   for (Eigen::Index i = 0; i < points.size(); ++i) {
-    for (int c = 0; c < 3; ++c) points.positions(i, c) = random.uniform(-10, 10);
+    for (int c = 0; c < 3; ++c) points.positions(i, c) = random.uniform(-40, 40);
     points.normals.row(i) = direction().transpose();
   }
-  constexpr double normal_mm = 10.0;
-  const OrientedPointTree tree(points, normal_mm);
+  constexpr double normal_mm = OrientedPointTree::normal_mm;
+  const OrientedPointTree tree(points);
   for (int query = 0; query < 50; ++query) {
-    const Eigen::Vector3d at = 12.0 * direction();
+    const Eigen::Vector3d at = 50.0 * direction();
     const Eigen::Vector3d normal = direction();
     const Eigen::VectorXd squares =
         (points.positions.rowwise() - at.transpose()).rowwise().squaredNorm() +
@@ -62,7 +62,7 @@ TEST(OrientedPointTree, AgreesWithASearchOfAllPoints) {
     EXPECT_EQ(found.index, nearest);
     EXPECT_NEAR(found.squared_distance, least, 1e-9);
   }
-  EXPECT_EQ(OrientedPointTree({Points3(0, 3), Points3(0, 3)}, 1.0)
+  EXPECT_EQ(OrientedPointTree({Points3(0, 3), Points3(0, 3)})
                 .nearest(Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX())
                 .index,
             -1);
