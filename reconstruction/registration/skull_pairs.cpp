@@ -102,8 +102,8 @@ SkullPairs part_pairs(const SkullState& rest, const PartAlignment& parts, const 
   return pairs;
 }
 
-SkullPairs far_pairs(const SkullState& state, const InputSurface& input, const PairLimits& limits,
-                     int threads) {
+SkullPairs alike_pairs(const SkullState& state, const InputSurface& input, const PairLimits& limits,
+                       bool both_ways, int threads) {
   const SkullTemplate& skull = *state.skull;
   const OrientedPoints& samples = input.samples();
   const double least_cosine = std::cos(radians(limits.normal_deg));
@@ -113,7 +113,6 @@ SkullPairs far_pairs(const SkullState& state, const InputSurface& input, const P
            state.surface.normals.row(v).dot(samples.normals.row(sample)) >= least_cosine;
   };
   const OrientedPointTree own({state.surface.vertices, state.surface.normals});
-  const OrientedPointTree theirs(samples);
   std::vector<int> chosen(static_cast<std::size_t>(samples.size()), -1);
   for_each_vertex(static_cast<int>(samples.size()), threads, [&](int i) {
     const int v = own.nearest(samples.positions.row(i), samples.normals.row(i)).index;
@@ -127,20 +126,28 @@ SkullPairs far_pairs(const SkullState& state, const InputSurface& input, const P
     pairs.target.row(v) += samples.positions.row(i);
     pairs.normal.row(v) += samples.normals.row(i);
   }
-  for_each_vertex(skull.boundary_count, threads, [&](int v) {
-    if (!skull.outer[static_cast<std::size_t>(v)]) return;
+  std::vector<int> alone;
+  for (int v = 0; v < skull.boundary_count; ++v) {
     if (pairs.weight[v] > 0.0) {
       pairs.target.row(v) /= pairs.weight[v];
       pairs.normal.row(v).normalize();
       pairs.weight[v] = 1.0;
-      return;
+    } else if (skull.outer[static_cast<std::size_t>(v)]) {
+      alone.push_back(v);
     }
-    const int i = theirs.nearest(state.surface.vertices.row(v), state.surface.normals.row(v)).index;
-    if (!alike(v, i)) return;
-    pairs.weight[v] = 1.0;
-    pairs.target.row(v) = samples.positions.row(i);
-    pairs.normal.row(v) = samples.normals.row(i);
-  });
+  }
+  if (both_ways) {
+    const OrientedPointTree theirs(samples);
+    for_each_vertex(static_cast<int>(alone.size()), threads, [&](int k) {
+      const int v = alone[static_cast<std::size_t>(k)];
+      const Eigen::Vector3d position = state.surface.vertices.row(v);
+      const int i = theirs.nearest(position, state.surface.normals.row(v)).index;
+      if (!alike(v, i)) return;
+      pairs.weight[v] = 1.0;
+      pairs.target.row(v) = samples.positions.row(i);
+      pairs.normal.row(v) = samples.normals.row(i);
+    });
+  }
   weigh(pairs, state, limits.least_scale_mm);
   return pairs;
 }

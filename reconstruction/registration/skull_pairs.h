@@ -43,11 +43,12 @@ SkullState state_of(const SkullTemplate& skull, Points3 vertices);
 SkullPairs part_pairs(const SkullState& rest, const PartAlignment& parts, const InputSurface& input,
                       const PairLimits& limits, int threads);
 
-/// Where template and input lie far from each other: both ways, each with the other's nearest point
-/// whose normal is alike (OrientedPointTree). A vertex that points of the input have chosen goes to
-/// their middle, another to the point that it chooses itself.
-SkullPairs far_pairs(const SkullState& state, const InputSurface& input, const PairLimits& limits,
-                     int threads);
+/// Each point of the input chooses the vertex nearest in place and direction (OrientedPointTree);
+/// an outer vertex goes to the middle of those that chose it. With `both_ways` one that none chose
+/// goes to the point that it chooses itself: for what lies far off, since at a break that is the
+/// edge.
+SkullPairs alike_pairs(const SkullState& state, const InputSurface& input, const PairLimits& limits,
+                       bool both_ways, int threads);
 
 /// Outer vertices where the template bends most, each with the nearest such point of the input.
 SkullPairs ridge_pairs(const SkullState& state, const std::vector<bool>& ridge,

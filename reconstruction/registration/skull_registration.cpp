@@ -24,7 +24,7 @@ namespace skullstation {
 
 namespace {
 
-enum class Search { far, ridges, two_way_and_ridges, two_way };
+enum class Search { far, ridges, alike_and_ridges, alike, two_way };
 
 /// A stretch of iterations at one stiffness.
 struct Level {
@@ -42,10 +42,10 @@ constexpr Level kLevels[] = {
     {"far", 1e6, 1.0, {20.0, 45.0, 8.0}, 0.0, Search::far, 3},
     {"far, soft", 1e5, 1.0, {15.0, 45.0, 6.0}, 0.0, Search::far, 6},
     {"curvature", 1e5, 1.0, {8.0, 45.0}, 0.0, Search::ridges, 3},
-    {"two-way, stiff", 1e5, 1.0, {6.0, 40.0}, 0.0, Search::two_way_and_ridges, 6},
-    {"two-way", 1e4, 1.0, {5.0, 40.0}, 0.0, Search::two_way_and_ridges, 6},
-    {"two-way, soft", 1e3, 1.0, {4.0, 35.0}, 0.0, Search::two_way_and_ridges, 4},
-    {"two-way, softer", 1e2, 1.0, {3.0, 35.0}, 0.05, Search::two_way, 3},
+    {"alike, stiff", 1e5, 1.0, {6.0, 40.0}, 0.0, Search::alike_and_ridges, 6},
+    {"alike", 1e4, 1.0, {5.0, 40.0}, 0.0, Search::alike_and_ridges, 6},
+    {"alike, soft", 1e3, 1.0, {4.0, 35.0}, 0.0, Search::alike_and_ridges, 4},
+    {"alike, softer", 1e2, 1.0, {3.0, 35.0}, 0.0, Search::alike, 3},
     {"fine", 1e1, 0.1, {2.0, 30.0}, 0.05, Search::two_way, 3},
 };
 /// Of the cranium alone, before the mandible is looked for.
@@ -194,24 +194,25 @@ class Fit {
   }
 
   SkullPairs pairs_of(const Level& level) const {
-    if (level.search == Search::far) {
-      SkullPairs pairs = far_pairs(state_, input_, level.limits, options_.threads);
-      if (mandible_found_) return pairs;
+    const int threads = options_.threads;
+    if (level.search == Search::two_way) {
+      return two_way_pairs(state_, input_, level.limits, level.inner_weight, threads);
+    }
+    if (level.search == Search::ridges) {
+      return ridge_pairs(state_, ridge_, input_, level.limits, threads);
+    }
+    const bool far = level.search == Search::far;
+    SkullPairs pairs = alike_pairs(state_, input_, level.limits, far, threads);
+    if (level.search == Search::alike_and_ridges) {
+      put_over(pairs, ridge_pairs(state_, ridge_, input_, level.limits, threads));
+    }
+    if (far && !mandible_found_) {
       // What a missing bone would find far away is another.
       for (int v = 0; v < skull_.boundary_count; ++v) {
         const bool lower =
             bone_of(skull_.region[static_cast<std::size_t>(v)]) == SkullBone::mandible;
         if (lower) pairs.weight[v] = 0.0;
       }
-      return pairs;
-    }
-    if (level.search == Search::ridges) {
-      return ridge_pairs(state_, ridge_, input_, level.limits, options_.threads);
-    }
-    SkullPairs pairs =
-        two_way_pairs(state_, input_, level.limits, level.inner_weight, options_.threads);
-    if (level.search == Search::two_way_and_ridges) {
-      put_over(pairs, ridge_pairs(state_, ridge_, input_, level.limits, options_.threads));
     }
     return pairs;
   }
