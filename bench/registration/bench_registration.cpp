@@ -1,6 +1,7 @@
 // How well and how fast templates are registered, as Markdown tables beside the targets of
 // docs/registration.md. Usage:
-//   bench_registration skulls TEMPLATE [N = 20] [seed = 1000]    people of a seed of their own
+//   bench_registration skulls TEMPLATE [N = 20] [seed = 1000] [smooth|projected-volume|volume]
+//                                                                people of a seed of their own
 //   bench_registration heads  TEMPLATE [N = 20] [seed = 1000]
 //   bench_registration led-heads TEMPLATE [N = 20] [seed = 1000]   heads led by their skulls
 //   bench_registration mesh   TEMPLATE SKULL.ply...              real skulls
@@ -70,7 +71,8 @@ class StageCosts {
   int fits_ = 0;
 };
 
-int bench_skulls(const SkullTemplate& skull, int people, std::uint64_t seed) {
+int bench_skulls(const SkullTemplate& skull, int people, std::uint64_t seed,
+                 const SkullRegistrationOptions& options) {
   fmt::print(
       "| person | face mean mm (<= 0.35) | P95 (<= 1.2) | inverted (0) | correspondence mean, "
       "outer "
@@ -85,7 +87,7 @@ int bench_skulls(const SkullTemplate& skull, int people, std::uint64_t seed) {
     Random random(mix(seed + 1, static_cast<std::uint64_t>(i)));
     const Similarity3 pose = random_pose(random);
     const Seconds began = Seconds::now();
-    const auto fit = register_skull(skull, moved(pose, person.skull));
+    const auto fit = register_skull(skull, moved(pose, person.skull), options);
     const double seconds = (Seconds::now() - began).processor;
     if (!fit) {
       fmt::print("| {} | {} |\n", i + 1, fit.error().message());
@@ -327,7 +329,13 @@ int run(const std::vector<std::string>& arguments) {
     return rest.size() > i ? std::atoi(rest[i].c_str()) : otherwise;
   };
   const auto seed = static_cast<std::uint64_t>(number(1, 1000));
-  if (what == "skulls") return bench_skulls(templates->skull, number(0, 20), seed);
+  if (what == "skulls") {
+    SkullRegistrationOptions options;
+    const std::string regularizer = rest.size() > 2 ? rest[2] : "smooth";
+    if (regularizer == "volume") options.regularizer = SkullRegularizer::volume;
+    if (regularizer == "projected-volume") options.regularizer = SkullRegularizer::projected_volume;
+    return bench_skulls(templates->skull, number(0, 20), seed, options);
+  }
   if (what == "heads") return bench_heads(templates->head, nullptr, number(0, 20), seed);
   if (what == "led-heads") {
     return bench_heads(templates->head, &templates->skull, number(0, 20), seed);

@@ -12,6 +12,7 @@
 #include "reconstruction/mesh/flat_cuts.h"
 #include "reconstruction/registration/head_led_by_skull.h"
 #include "reconstruction/registration/head_registration.h"
+#include "reconstruction/registration/observed_bone.h"
 #include "reconstruction/registration/skull_registration.h"
 #include "reconstruction/statistics/subject_file.h"
 #include "reconstruction/statistics/tissue_thickness.h"
@@ -50,8 +51,9 @@ std::string templates_sha256(const SkullTemplate& skull, const HeadTemplate& hea
 }
 
 /// Sex, age and body mass index, as far as subject.json tells them.
-Result<void> read_facts(const fs::path& file, ModelSubject& subject) {
-  if (!fs::exists(file)) return {};
+Result<PersonFacts> read_facts(const fs::path& file) {
+  PersonFacts facts;
+  if (!fs::exists(file)) return facts;
   const auto text = read_file(file);
   if (!text) return forward(text);
   const auto json = nlohmann::json::parse(*text, nullptr, false);
@@ -60,70 +62,32 @@ Result<void> read_facts(const fs::path& file, ModelSubject& subject) {
   }
   if (const auto sex = json.find("sex"); sex != json.end() && sex->is_string()) {
     const auto word = sex->get<std::string>();
-    if (word == "male" || word == "M") subject.facts.male = 1.0;
-    if (word == "female" || word == "F") subject.facts.male = 0.0;
+    if (word == "male" || word == "M") facts.male = 1.0;
+    if (word == "female" || word == "F") facts.male = 0.0;
   }
   const auto number = [&](const char* name, std::optional<double>& value) {
     if (const auto found = json.find(name); found != json.end() && found->is_number()) {
       value = found->get<double>();
     }
   };
-  number("age_years", subject.facts.age_years);
-  number("bmi", subject.facts.body_mass_index);
-  return {};
+  number("age_years", facts.age_years);
+  number("bmi", facts.body_mass_index);
+  return facts;
 }
 
-Result<ModelSubject> fit_subject(const fs::path& folder, const SkullTemplate& skull,
-                                 const HeadTemplate& head, const SubjectFitOptions& options,
-                                 const Progress& progress) {
-  ModelSubject subject;
-  subject.name = folder.filename().string();
-  if (const auto read = read_facts(folder / "subject.json", subject); !read) return forward(read);
-  const auto closed_bone = read_mesh(folder / "skull.ply");
-  if (!closed_bone) return forward(closed_bone);
-  const auto closed_skin = read_mesh(folder / "skin.ply");
-  if (!closed_skin) return forward(closed_skin);
-  // Where the scan ended are neither bone nor skin: no template may take the lids for them.
-  const TriangleMesh bone = opened_at_flat_cuts(*closed_bone);
-  const TriangleMesh skin = opened_at_flat_cuts(*closed_skin);
-
-  SkullRegistrationOptions skull_options;
-  skull_options.seed = options.seed;
-  skull_options.threads = options.threads;
-  const auto skull_fit = register_skull(skull, bone, skull_options, progress.part(0.0, 0.8));
-  if (!skull_fit) return forward(skull_fit);
-  if (skull_fit->quality.facial.mean_mm > worst_facial_mean_mm) {
-    return fail(ErrorKind::no_result, folder.string(),
-                fmt::format("the template lies {:.1f} mm from the face of its skull on average",
-                            skull_fit->quality.facial.mean_mm),
-                "look at the skull's surface");
-  }
-  if (skull_fit->quality.observed_share < least_facial_share) {
-    return fail(ErrorKind::no_result, folder.string(),
-                fmt::format("only {:.0f} % of the skull's outside is there",
-                            100.0 * skull_fit->quality.observed_share));
-  }
-  HeadRegistrationOptions head_options;
-  head_options.pose = &skull_fit->input_from_template;
-  head_options.start = head_led_by_skull(head, skull, *skull_fit);
-  head_options.seed = options.seed;
-  head_options.threads = options.threads;
-  const auto head_fit = register_head(head, skin, head_options, progress.part(0.8, 1.0));
-  if (!head_fit) return forward(head_fit);
-
-  subject.skull = skull_fit->vertices;
-  subject.skull_observed = skull_fit->observed;
-  subject.head = head_fit->vertices;
-  std::vector<bool> measurable = skull_fit->observed;
-  for (std::size_t v = 0; v < measurable.size(); ++v) {
-    if (!skull.outer[v]) measurable[v] = false;
-  }
-  ThicknessOptions thickness;
-  thickness.threads = options.threads;
-  const auto depths =
-      tissue_thickness(surface_of(skull, skull_fit->vertices), measurable, skin, thickness);
-  if (!depths) return forward(depths);
-  subject.tissue_mm = *depths;
+Result<ModelSubject> fit_folder(const fs::path& folder, const SkullTemplate& skull,
+                                const HeadTemplate& head, const SubjectFitOptions& options,
+                                const Progress& progress) {
+  const auto facts = read_facts(folder / "subject.json");
+  if (!facts) return forward(facts);
+  const auto bone = read_mesh(folder / "skull.ply");
+  if (!bone) return forward(bone);
+  const auto skin = read_mesh(folder / "skin.ply");
+  if (!skin) return forward(skin);
+  auto subject = fit_subject(*bone, *skin, skull, head, options, progress);
+  if (!subject) return forward(subject);
+  subject->name = folder.filename().string();
+  subject->facts = *facts;
   return subject;
 }
 
@@ -161,7 +125,7 @@ Result<SubjectFit> fitted_subject(const fs::path& folder, const SkullTemplate& s
       return fit;
     }
   }
-  auto subject = fit_subject(folder, skull, head, options, progress);
+  auto subject = fit_folder(folder, skull, head, options, progress);
   if (!subject) {
     if (subject.error().kind == ErrorKind::cancelled) return forward(subject);
     fit.failure = subject.error().message();
@@ -180,17 +144,10 @@ std::string what_is_missing(const SkullTemplate& skull, const ModelSubject& subj
   std::string missing;
   for (const auto& [bone, name] :
        {std::pair(SkullBone::cranium, "cranium"), {SkullBone::mandible, "mandible"}}) {
-    double outer = 0.0;
-    double seen = 0.0;
-    for (int v = 0; v < skull.boundary_count; ++v) {
-      const auto at = static_cast<std::size_t>(v);
-      if (!skull.outer[at] || bone_of(skull.region[at]) != bone) continue;
-      outer += 1.0;
-      seen += subject.skull_observed[at] ? 1.0 : 0.0;
-    }
-    if (outer == 0.0 || seen >= enough * outer) continue;
+    const double seen = observed_share(skull, subject.skull_observed, bone);
+    if (seen >= enough) continue;
     missing += fmt::format("{}of the {} {:.0f} % were observed", missing.empty() ? "" : ", ", name,
-                           100.0 * seen / outer);
+                           100.0 * seen);
   }
   return missing.empty() ? "" : missing + "; the rest follows from the others";
 }
@@ -210,6 +167,53 @@ void name_duplicates(std::vector<SubjectFit>& fits) {
 }
 
 }  // namespace
+
+Result<ModelSubject> fit_subject(const TriangleMesh& closed_bone, const TriangleMesh& closed_skin,
+                                 const SkullTemplate& skull, const HeadTemplate& head,
+                                 const SubjectFitOptions& options, const Progress& progress) {
+  // Where the scan ended are neither bone nor skin: no template may take the lids for them.
+  const TriangleMesh bone = opened_at_flat_cuts(closed_bone);
+  const TriangleMesh skin = opened_at_flat_cuts(closed_skin);
+  SkullRegistrationOptions skull_options;
+  skull_options.seed = options.seed;
+  skull_options.threads = options.threads;
+  const auto skull_fit = register_skull(skull, bone, skull_options, progress.part(0.0, 0.8));
+  if (!skull_fit) return forward(skull_fit);
+  if (skull_fit->quality.facial.mean_mm > worst_facial_mean_mm) {
+    return fail(ErrorKind::no_result, "skull",
+                fmt::format("the template lies {:.1f} mm from the face of its skull on average",
+                            skull_fit->quality.facial.mean_mm),
+                "look at the skull's surface");
+  }
+  if (skull_fit->quality.observed_share < least_facial_share) {
+    return fail(ErrorKind::no_result, "skull",
+                fmt::format("only {:.0f} % of the skull's outside is there",
+                            100.0 * skull_fit->quality.observed_share));
+  }
+  HeadRegistrationOptions head_options;
+  head_options.pose = &skull_fit->input_from_template;
+  head_options.start = head_led_by_skull(head, skull, *skull_fit);
+  head_options.seed = options.seed;
+  head_options.threads = options.threads;
+  const auto head_fit = register_head(head, skin, head_options, progress.part(0.8, 1.0));
+  if (!head_fit) return forward(head_fit);
+
+  ModelSubject subject;
+  subject.skull = skull_fit->vertices;
+  subject.skull_observed = skull_fit->observed;
+  subject.head = head_fit->vertices;
+  std::vector<bool> measurable = skull_fit->observed;
+  for (std::size_t v = 0; v < measurable.size(); ++v) {
+    if (!skull.outer[v]) measurable[v] = false;
+  }
+  ThicknessOptions thickness;
+  thickness.threads = options.threads;
+  const auto depths =
+      tissue_thickness(surface_of(skull, skull_fit->vertices), measurable, skin, thickness);
+  if (!depths) return forward(depths);
+  subject.tissue_mm = *depths;
+  return subject;
+}
 
 Result<std::vector<SubjectFit>> fit_subjects(const fs::path& subjects, const SkullTemplate& skull,
                                              const HeadTemplate& head,

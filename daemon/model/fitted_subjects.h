@@ -18,6 +18,13 @@ struct SubjectFitOptions {
   int threads = 0;  ///< 0: all
 };
 
+/// Fits both templates to one subject's surfaces, the head's from where the fitted skull leads it,
+/// and measures the tissue; without name and facts. Fails like register_skull, and with `no_result`
+/// where the skull's fit is no use to a model.
+Result<ModelSubject> fit_subject(const TriangleMesh& bone, const TriangleMesh& skin,
+                                 const SkullTemplate& skull, const HeadTemplate& head,
+                                 const SubjectFitOptions& options, const Progress& progress = {});
+
 /// How the templates lie on one subject.
 struct SubjectFit {
   ModelSubject subject;
