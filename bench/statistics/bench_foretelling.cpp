@@ -205,11 +205,11 @@ Result<void> run(const std::filesystem::path& subject_folder,
   const auto tissue = population_tissue_model(templates->skull, *subjects);
   if (!tissue) return forward(tissue);
   // Millimetres, root mean square, at the mean depth.
-  const VectorXd depths = tissue_at(*tissue, VectorXd::Zero(tissue->mode_count()));
-  const MatrixXd moves = depths.array().isNaN().select(0.0, depths).asDiagonal() * tissue->modes;
+  const VectorXd usual = tissue_at(*tissue, VectorXd::Zero(tissue->mode_count()));
+  const MatrixXd moves = usual.array().isNaN().select(0.0, usual).asDiagonal() * tissue->modes;
   const VectorXd tissue_weights =
       moves.colwise().norm().transpose() /
-      std::sqrt(static_cast<double>(depths.size() - depths.array().isNaN().count()));
+      std::sqrt(static_cast<double>(usual.size() - usual.array().isNaN().count()));
 
   const auto count = static_cast<Index>(subjects->size());
   std::vector<Row> rows;

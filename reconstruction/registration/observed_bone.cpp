@@ -26,7 +26,7 @@ double observed_share(const SkullTemplate& skull, const std::vector<bool>& obser
     all += area[v];
     if (observed[at]) seen += area[v];
   }
-  return all > 0.0 ? seen / all : 0.0;
+  return all > 0.0 ? seen / all : 1.0;
 }
 
 Eigen::VectorXd observed_around(const SkullTemplate& skull, const std::vector<bool>& observed) {

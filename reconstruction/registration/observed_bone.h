@@ -13,7 +13,8 @@ namespace skullstation {
 /// Outer surface vertices that were observed.
 std::vector<int> observed_outer(const SkullTemplate& skull, const std::vector<bool>& observed);
 
-/// Share of the template's outer surface that was observed, or of one bone's.
+/// Share of the template's outer surface that was observed, or of one bone's; 1 of a bone that the
+/// template lacks.
 double observed_share(const SkullTemplate& skull, const std::vector<bool>& observed,
                       std::optional<SkullBone> bone = std::nullopt);
 
