@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "core/random.h"
 #include "daemon/model/model_source.h"
 #include "reconstruction/phantom/person.h"
 #include "reconstruction/registration/similarity_fit.h"
@@ -85,7 +86,8 @@ int run(int people, std::uint64_t seed) {
   const PersonMaker maker(edge_mm, 0);
   std::vector<Points3> skulls;
   for (int i = 1; i <= people; ++i) {
-    const Person person = maker.make(draw_person(seed * 10000 + static_cast<std::uint64_t>(i)), 0);
+    const Person person =
+        maker.make(draw_person(mix(seed * 10000 + static_cast<std::uint64_t>(i), 0)), 0);
     skulls.push_back(laid_on(vertices_of(person, skull), skull.vertices, weights));
   }
   std::array<Errors, hidden_parts.size()> errors;

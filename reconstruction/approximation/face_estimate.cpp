@@ -20,9 +20,9 @@ namespace {
 
 using Eigen::Index;
 
-/// Depths err alike over a centimetre or two: all the face's vertices together tell of the head's
-/// modes no more than so many on their own.
-constexpr double independent_points = 300.0;
+/// Depths err alike over centimetres: all the face's vertices together tell of the head's modes no
+/// more than so many on their own (docs/faces.md).
+constexpr double independent_points = 30.0;
 /// How closely the head keeps to the spheres.
 constexpr double contact_sd_mm = 0.5;
 /// What the head model's modes leave over in people whom it has not seen.
