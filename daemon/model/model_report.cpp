@@ -127,10 +127,16 @@ Result<Report> model_report(const ModelSource& source, const ReportPictureOption
   report.add(Pictures{*tissue});
 
   report.add(Heading{"At the landmarks"});
-  report.add(Paragraph{
+  const std::vector<ErrorBars::Row> depths = depths_beside_t_table(model);
+  const auto near = std::ranges::count_if(depths, [](const ErrorBars::Row& row) {
+    return std::abs(row.ours.mean - row.reference.mean) <= row.reference.sd;
+  });
+  report.add(Paragraph{fmt::format(
       "Mean and standard deviation from bone landmark to skin landmark: the model's subjects "
-      "(filled) beside the T-Table of Hona and Stephan 2024 (open)."});
-  report.add(ErrorBars{depths_beside_t_table(model), "mm", "model", "T-Table"});
+      "(filled) beside the T-Table of Hona and Stephan 2024 (open). {} of {} means lie within one "
+      "standard deviation of the table's.",
+      near, depths.size())});
+  report.add(ErrorBars{depths, "mm", "model", "T-Table"});
 
   report.add(Heading{"Figures"});
   std::vector<std::pair<std::string, std::string>> rows = {
