@@ -29,18 +29,18 @@ enum class Pairs { alike, nearest, sliding };  ///< the last from all points
 /// in units of all points'.
 struct Level {
   double bending_mm4;
-  Pairs pairs;
   HeadPairLimits limits;
   double landmark_weight;
+  Pairs pairs;
   int iterations;
 };
 
 /// Stiff to soft; the fourth root is about the length over which the skin may bend.
 constexpr Level kLevels[] = {
-    {1e6, Pairs::alike, {20.0, 60.0}, 10.0, 8},  {1e5, Pairs::alike, {14.0, 55.0}, 5.0, 8},
-    {1e4, Pairs::alike, {10.0, 50.0}, 1.0, 8},   {1e3, Pairs::alike, {7.0, 45.0}, 0.5, 8},
-    {1e2, Pairs::alike, {5.0, 45.0}, 0.2, 8},    {1e1, Pairs::nearest, {4.0, 40.0}, 0.1, 3},
-    {1.0, Pairs::sliding, {3.0, 40.0}, 0.02, 3}, {0.1, Pairs::sliding, {2.0, 40.0}, 0.0, 3},
+    {1e6, {20.0, 60.0}, 10.0, Pairs::alike, 8},  {1e5, {14.0, 55.0}, 5.0, Pairs::alike, 8},
+    {1e4, {10.0, 50.0}, 1.0, Pairs::alike, 8},   {1e3, {7.0, 45.0}, 0.5, Pairs::alike, 8},
+    {1e2, {5.0, 45.0}, 0.2, Pairs::alike, 8},    {1e1, {4.0, 40.0}, 0.1, Pairs::nearest, 3},
+    {1.0, {3.0, 40.0}, 0.02, Pairs::sliding, 3}, {0.1, {2.0, 40.0}, 0.0, Pairs::sliding, 3},
 };
 constexpr double kCoarseSpacing_mm = 4.0;
 constexpr double kFineSpacing_mm = 1.5;
@@ -65,7 +65,7 @@ Result<ScanPoints> scan_points(const TriangleMesh& scan, const std::vector<doubl
 class Fit {
  public:
   Fit(const HeadTemplate& head, Points3 start, const HeadRegistrationOptions& options,
-      std::vector<InputLandmark> landmarks)
+      const std::vector<InputLandmark>& landmarks)
       : head_(head),
         options_(options),
         rim_(boundary_vertices(head.triangles, head.vertices.rows())),
@@ -244,7 +244,7 @@ Result<FittedHead> register_head(const HeadTemplate& head, const TriangleMesh& i
   if (!fine) return forward(fine);
   FittedHead fitted;
   fitted.stages.push_back({"pose", 1, 0, 0.0, 0.0, processor_seconds() - began_s});
-  Fit fit(head, std::move(start), options, std::move(landmarks));
+  Fit fit(head, std::move(start), options, landmarks);
   int number = 0;
   for (const Level& level : kLevels) {
     if (progress.stop.stop_requested()) return fail(ErrorKind::cancelled, "head", "cancelled");
